@@ -1,0 +1,145 @@
+#include "core/delta/diff.h"
+
+#include <algorithm>
+#include <limits>
+
+namespace dynmesh {
+namespace {
+
+constexpr int kAttributeStage = 4;
+constexpr int kDone = 5;
+
+/// Appends after-images of slots to a delta.
+class DiffBuilder {
+ public:
+  DiffBuilder(const Mesh& mesh, int64_t from, Delta& delta)
+      : mesh_(mesh), from_(static_cast<Stamp>(from)), delta_(delta) {}
+
+  /// Visits slots from `cursor` on until `budget` slots have been appended; stops at page ends.
+  void Advance(DiffCursor& cursor, size_t budget) {
+    while (!cursor.done() && items_ < budget) {
+      const Slot end = PageEnd(cursor, budget);
+      VisitRange(cursor, end);
+      cursor.next = end;
+      if (end >= StageLimit(cursor)) NextStage(cursor);
+    }
+  }
+
+ private:
+  /// Everything at once when the budget is unlimited, else the next page of stamps.
+  Slot PageEnd(const DiffCursor& cursor, size_t budget) const {
+    const Slot limit = StageLimit(cursor);
+    if (budget == std::numeric_limits<size_t>::max()) return limit;
+    return std::min<uint64_t>(limit, uint64_t{cursor.next} + StampColumn::kPageSlots);
+  }
+
+  Slot StageLimit(const DiffCursor& cursor) const {
+    if (cursor.stage < kAttributeStage) return mesh_.changed(kEntityKinds[cursor.stage]).size();
+    const auto& columns = mesh_.attributes();
+    return cursor.column < static_cast<int>(columns.size()) ? columns[cursor.column].stamps().size() : 0;
+  }
+
+  void NextStage(DiffCursor& cursor) const {
+    cursor.next = 0;
+    if (cursor.stage == kAttributeStage) ++cursor.column;
+    if (cursor.stage < kAttributeStage) ++cursor.stage;
+    if (cursor.stage == kAttributeStage && cursor.column >= static_cast<int>(mesh_.attributes().size())) {
+      cursor.stage = kDone;
+    }
+  }
+
+  void VisitRange(const DiffCursor& cursor, Slot end) {
+    if (cursor.stage == kAttributeStage) return VisitRows(cursor, end);
+    const EntityKind kind = kEntityKinds[cursor.stage];
+    mesh_.changed(kind).ForEachSince(from_, cursor.next, end, [&](Slot slot) {
+      ++items_;
+      kind == EntityKind::kVertex ? VisitVertex(VertexId(slot)) : VisitElement({kind, slot});
+    });
+  }
+
+  void VisitVertex(VertexId v) {
+    if (!mesh_.IsLive(v)) {
+      delta_.removed_vertices.push_back(v.slot());
+      return;
+    }
+    delta_.vertex_slots.push_back(v.slot());
+    delta_.positions.push_back(mesh_.Position(v));
+  }
+
+  void VisitElement(EntityId id) {
+    ElementChanges& changes = delta_.OfKind(id.kind);
+    if (!mesh_.IsLive(id) || !mesh_.IsElement(id)) {
+      changes.removed.push_back(id.slot);
+      return;
+    }
+    const auto vertices = mesh_.VerticesOf(id);
+    changes.slots.push_back(id.slot);
+    changes.types.push_back(mesh_.Type(id));
+    changes.vertices.insert(changes.vertices.end(), vertices.begin(), vertices.end());
+  }
+
+  /// Rows of dead slots travel too, as the zeros that removal left: derived entities die unseen by a mirror.
+  void VisitRows(const DiffCursor& cursor, Slot end) {
+    if (cursor.column >= static_cast<int>(mesh_.attributes().size())) return;
+    const AttributeColumn& column = mesh_.attributes()[cursor.column];
+    AttributeChanges changes;
+    changes.spec = column.spec();
+    column.stamps().ForEachSince(from_, cursor.next, end, [&](Slot slot) {
+      ++items_;
+      const auto row = column.Row(slot);
+      changes.slots.push_back(slot);
+      changes.rows.insert(changes.rows.end(), row.begin(), row.end());
+    });
+    const bool news = !changes.slots.empty() || (column.born() > from_ && cursor.next == 0);
+    if (news) Append(std::move(changes));
+  }
+
+  /// Joins pages of the same column.
+  void Append(AttributeChanges changes) {
+    if (!delta_.attributes.empty() && delta_.attributes.back().spec == changes.spec) {
+      AttributeChanges& last = delta_.attributes.back();
+      last.slots.insert(last.slots.end(), changes.slots.begin(), changes.slots.end());
+      last.rows.insert(last.rows.end(), changes.rows.begin(), changes.rows.end());
+    } else {
+      delta_.attributes.push_back(std::move(changes));
+    }
+  }
+
+  const Mesh& mesh_;
+  const Stamp from_;
+  Delta& delta_;
+  size_t items_ = 0;
+};
+
+Delta EmptyDelta(const Mesh& mesh, int64_t from) {
+  Delta delta;
+  delta.from_revision = from;
+  delta.to_revision = mesh.revision();
+  delta.checksum = mesh.checksum();
+  return delta;
+}
+
+}  // namespace
+
+Delta Diff(const Mesh& mesh, int64_t from) {
+  Delta delta = EmptyDelta(mesh, from);
+  DiffCursor cursor;
+  DiffBuilder(mesh, from, delta).Advance(cursor, std::numeric_limits<size_t>::max());
+  return delta;
+}
+
+Delta DiffPart(const Mesh& mesh, int64_t from, size_t max_items, DiffCursor& cursor) {
+  Delta delta = EmptyDelta(mesh, from);
+  delta.consistent = false;
+  DiffBuilder(mesh, from, delta).Advance(cursor, std::max<size_t>(max_items, 1));
+  return delta;
+}
+
+size_t DiffSizeBound(const Mesh& mesh, int64_t from) {
+  size_t bound = 0;
+  for (EntityKind kind : kEntityKinds) bound += mesh.changed(kind).BoundSince(from);
+  for (const AttributeColumn& column : mesh.attributes()) bound += column.stamps().BoundSince(from);
+  return bound;
+}
+
+}  // namespace dynmesh

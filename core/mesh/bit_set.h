@@ -1,0 +1,95 @@
+#ifndef DYNMESH_CORE_MESH_BIT_SET_H_
+#define DYNMESH_CORE_MESH_BIT_SET_H_
+
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "core/mesh/ids.h"
+
+namespace dynmesh {
+
+/// A growing set of slots with a summary bit for each 64, so that listing a sparse set skips 4096 slots
+/// at a time.
+///
+/// Cost: Test, Set, Clear O(1); Next and ForEach O(members + universe / 4096).
+/// Thread safety: that of std::vector.
+class BitSet {
+ public:
+  bool Test(Slot slot) const {
+    const size_t word = slot / 64;
+    return word < words_.size() && (words_[word] >> (slot % 64) & 1);
+  }
+
+  void Set(Slot slot) {
+    const size_t word = slot / 64;
+    if (word >= words_.size()) Grow(word);
+    const uint64_t bit = uint64_t{1} << (slot % 64);
+    count_ += (words_[word] & bit) == 0;
+    words_[word] |= bit;
+    summary_[word / 64] |= uint64_t{1} << (word % 64);
+  }
+
+  void Clear(Slot slot) {
+    const size_t word = slot / 64;
+    if (word >= words_.size()) return;
+    const uint64_t bit = uint64_t{1} << (slot % 64);
+    count_ -= (words_[word] & bit) != 0;
+    words_[word] &= ~bit;
+    if (words_[word] == 0) summary_[word / 64] &= ~(uint64_t{1} << (word % 64));
+  }
+
+  void Assign(Slot slot, bool member) { member ? Set(slot) : Clear(slot); }
+
+  /// The smallest member >= slot, or kNoSlot.
+  Slot Next(Slot slot) const {
+    size_t word = slot / 64;
+    if (word >= words_.size()) return kNoSlot;
+    if (const uint64_t rest = words_[word] >> (slot % 64); rest != 0) return slot + std::countr_zero(rest);
+    word = NextWord(word + 1);
+    return word == kNone ? kNoSlot : word * 64 + std::countr_zero(words_[word]);
+  }
+
+  /// Calls fn(slot) for each member, ascending. `fn` must not change the set.
+  template <typename Fn>
+  void ForEach(Fn fn) const {
+    for (size_t word = NextWord(0); word != kNone; word = NextWord(word + 1)) {
+      for (uint64_t bits = words_[word]; bits != 0; bits &= bits - 1) {
+        fn(static_cast<Slot>(word * 64 + std::countr_zero(bits)));
+      }
+    }
+  }
+
+  uint32_t size() const { return count_; }
+  bool empty() const { return count_ == 0; }
+  size_t memory_bytes() const { return (words_.size() + summary_.size()) * sizeof(uint64_t); }
+
+ private:
+  static constexpr size_t kNone = ~size_t{0};
+
+  void Grow(size_t word) {
+    words_.resize(word + 1);
+    summary_.resize(word / 64 + 1);
+  }
+
+  /// The first non-zero word at or after `word`, or kNone.
+  size_t NextWord(size_t word) const {
+    size_t index = word / 64;
+    if (index >= summary_.size()) return kNone;
+    uint64_t bits = summary_[index] >> (word % 64) << (word % 64);
+    while (bits == 0) {
+      if (++index == summary_.size()) return kNone;
+      bits = summary_[index];
+    }
+    return index * 64 + std::countr_zero(bits);
+  }
+
+  std::vector<uint64_t> words_;
+  std::vector<uint64_t> summary_;
+  uint32_t count_ = 0;
+};
+
+}  // namespace dynmesh
+
+#endif  // DYNMESH_CORE_MESH_BIT_SET_H_

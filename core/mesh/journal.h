@@ -1,0 +1,53 @@
+#ifndef DYNMESH_CORE_MESH_JOURNAL_H_
+#define DYNMESH_CORE_MESH_JOURNAL_H_
+
+#include <cstdint>
+#include <vector>
+
+#include "core/mesh/checksum.h"
+#include "core/mesh/ids.h"
+#include "core/mesh/stamps.h"
+
+namespace dynmesh {
+
+/// The smallest steps that edits are made of; each can be undone when all later ones have been.
+enum class JournalOp : uint8_t {
+  kCreate,           ///< entity began; a = born stamp before, b = changed stamp before
+  kDestroy,          ///< entity ended; its arrays still hold it; b = changed stamp before
+  kSetElement,       ///< element flag set; b = changed stamp before
+  kClearElement,     ///< element flag cleared; b = changed stamp before
+  kSetDuplicate,     ///< duplicate flag set
+  kClearDuplicate,   ///< duplicate flag cleared
+  kFlipEdge,         ///< the two vertices changed places
+  kReorderFace,      ///< a = FaceCode that leads back
+  kReplaceCellFace,  ///< a = local face, b = packed OrientedFace before
+  kReplaceFaceEdge,  ///< a = local edge, b = edge before
+  kMoveVertex,       ///< b = changed stamp before; position before: Journal::positions
+  kAddAttribute,     ///< the last column was added
+  kSetAttribute,     ///< a = column, b = stamp before; row before: Journal::rows
+};
+
+struct JournalEntry {
+  JournalOp op;
+  EntityKind kind;
+  Slot slot;
+  uint32_t a;
+  uint32_t b;
+};
+
+/// What Mesh::Rollback undoes, last entry first. Values too large for an entry stand on stacks beside.
+struct Journal {
+  std::vector<JournalEntry> entries;
+  std::vector<Point> positions;
+  std::vector<uint8_t> rows;
+
+  void Clear() {
+    entries.clear();
+    positions.clear();
+    rows.clear();
+  }
+};
+
+}  // namespace dynmesh
+
+#endif  // DYNMESH_CORE_MESH_JOURNAL_H_

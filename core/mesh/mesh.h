@@ -1,0 +1,379 @@
+#ifndef DYNMESH_CORE_MESH_MESH_H_
+#define DYNMESH_CORE_MESH_MESH_H_
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/container/flat_hash_map.h"
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+#include "absl/types/optional.h"
+#include "absl/types/span.h"
+#include "core/mesh/attributes.h"
+#include "core/mesh/bit_set.h"
+#include "core/mesh/checksum.h"
+#include "core/mesh/element_type.h"
+#include "core/mesh/error.h"
+#include "core/mesh/ids.h"
+#include "core/mesh/incidence_lists.h"
+#include "core/mesh/journal.h"
+#include "core/mesh/slots.h"
+#include "core/mesh/stamps.h"
+
+namespace dynmesh {
+
+/// How a stored face lies in a cell (or another list of the same vertices): with n vertices,
+/// key[k] = stored[(rotation + k) mod n], or stored[(rotation - k) mod n] when flipped.
+struct FaceCode {
+  uint8_t value = 0;  ///< rotation | flipped << 2
+
+  constexpr int rotation() const { return value & 3; }
+  constexpr bool flipped() const { return value & 4; }
+  /// Position in the stored face of the key's vertex k.
+  constexpr int StoredVertex(int k, int n) const { return (rotation() + (flipped() ? n - k : k)) % n; }
+  /// Position in the stored face of the key's edge k, which joins key vertices k and k + 1.
+  constexpr int StoredEdge(int k, int n) const {
+    return (rotation() + (flipped() ? n - k - 1 : k)) % n;
+  }
+};
+
+/// How the face with the vertex cycle `stored` lies against `key`, or nullopt if they are not the same cycle.
+absl::optional<FaceCode> MatchFace(absl::Span<const VertexId> stored, absl::Span<const VertexId> key);
+
+/// A face of a cell with its orientation code, in 32 bits: hence at most 2^29 - 1 faces.
+class OrientedFace {
+ public:
+  constexpr OrientedFace() = default;
+  constexpr OrientedFace(FaceId face, FaceCode code) : packed_(face.slot() << 3 | code.value) {}
+
+  constexpr FaceId face() const { return FaceId(packed_ >> 3); }
+  constexpr FaceCode code() const { return FaceCode{static_cast<uint8_t>(packed_ & 7)}; }
+
+ private:
+  uint32_t packed_ = kNoSlot;
+};
+
+enum class DuplicatePolicy { kKeep, kRefuse };
+
+/// Upper bounds on slots ever used, for each kind; beyond: RESOURCE_EXHAUSTED.
+struct MeshLimits {
+  /// Vertex ids stay below 2^31 (edit batches use the top bit), faces below 2^29 (OrientedFace).
+  std::array<uint32_t, kNumEntityKinds> max_slots = {0x7fffffffu, 0x7fffffffu, 0x1fffffffu, 0x7fffffffu};
+};
+
+struct MeshOptions {
+  DuplicatePolicy duplicates = DuplicatePolicy::kKeep;
+  MeshLimits limits;
+};
+
+/// A dynamic mesh of vertices, edges, faces and cells of every kind, manifold or not.
+///
+/// Users insert *elements* (wire edges, dangling faces, cells); the faces and edges below them are derived,
+/// shared, and live while something needs them:
+///
+///     Mesh mesh;
+///     auto a = *mesh.AddVertex({0, 0, 0}); ...
+///     auto tet = *mesh.AddElement(ElementType::kTetrahedron, {a, b, c, d});  // + 4 faces, 6 edges
+///     mesh.Commit();                                                        // revision 1
+///     mesh.RemoveElement(tet);                                              // the faces and edges go too
+///
+/// Stored relations: downwards cell->vertices, cell->faces, face->vertices, face->edges, edge->vertices;
+/// upwards vertex->edges, edge->faces, face->cells. The other nine: relations.h. Upward lists hold an
+/// entry for each use, in arbitrary order: a face that uses an edge twice is in its list twice.
+///
+/// Invariants (Validate() in validate.h checks them all):
+///  - each vertex pair has at most one edge that faces use, each vertex cycle at most one face that cells
+///    use (the primary); other edges and faces there are duplicate elements, and while any element
+///    stands there, the primary is one;
+///  - a derived entity is used by something; a face or edge is on the boundary bit sets and counters
+///    exactly as its number of uses says;
+///  - checksum, counts and stamps are those of the present content.
+///
+/// Revisions: edits are stamped revision() + 1, which becomes the revision at Commit(). Between
+/// BeginBatch() and Commit() a journal allows Rollback() to the exact state of BeginBatch().
+///
+/// Errors: a call that returns an error has changed nothing. Entities passed by id must be live: else
+/// NOT_FOUND with UNKNOWN_ENTITY or ENTITY_REMOVED. Accessors by id (not returning a status)
+/// REQUIRE live ids and check nothing.
+/// Cost: adding or removing an element is linear in its own size and in the lengths of the shortest
+/// lists round its edges (paper, section 3: smart edges and smart vertices).
+/// Thread safety: that of std::vector. Source: "Considerations toward a Dynamic Mesh Data Structure".
+class Mesh {
+ public:
+  explicit Mesh(const MeshOptions& options = {});
+  Mesh(Mesh&&) = default;
+  Mesh& operator=(Mesh&&) = default;
+
+  // ---- Size, liveness, revisions ----
+
+  const MeshOptions& options() const { return options_; }
+  int64_t revision() const { return revision_; }
+  const Slots& slots(EntityKind kind) const { return slots_[Dimension(kind)]; }
+  uint32_t NumLive(EntityKind kind) const { return slots(kind).num_live(); }
+  /// Live elements of a kind; 0 for vertices.
+  uint32_t NumElements(EntityKind kind) const { return num_elements_[Dimension(kind)]; }
+  bool IsLive(EntityId id) const { return slots(id.kind).IsLive(id.slot); }
+
+  /// NOT_FOUND unless `id` is live and its occupant was born at or before `as_of_revision`.
+  absl::Status CheckLive(EntityId id, int64_t as_of_revision = std::numeric_limits<int64_t>::max()) const;
+
+  /// Revision that last changed: the position of a vertex, or the element at a slot (added, removed).
+  /// Derived faces and edges have none.
+  const StampColumn& changed(EntityKind kind) const { return changed_[Dimension(kind)]; }
+
+  // ---- Reading ----
+
+  const Point& Position(VertexId v) const { return positions_[v.slot()]; }
+  ElementType Type(EntityId id) const { return static_cast<ElementType>(flags(id) & kTypeMask); }
+  bool IsElement(EntityId id) const { return id.kind != EntityKind::kVertex && flags(id) & kElementFlag; }
+  /// A kept element that stands where another element of the same vertices stood already. Cells never are.
+  bool IsDuplicate(EntityId id) const { return id.kind != EntityKind::kVertex && flags(id) & kDuplicateFlag; }
+  /// An element that names a vertex twice.
+  bool IsDegenerate(EntityId id) const;
+
+  absl::Span<const VertexId> Vertices(EdgeId e) const { return edge_vertices_[e.slot()]; }
+  absl::Span<const VertexId> Vertices(FaceId f) const {
+    return absl::MakeConstSpan(&face_vertices_[size_t{f.slot()} * face_stride_], FaceSize(f));
+  }
+  absl::Span<const VertexId> Vertices(CellId c) const {
+    return absl::MakeConstSpan(&cell_vertices_[size_t{c.slot()} * cell_vertex_stride_], NumVertices(Type(c)));
+  }
+  /// Of an edge, face or cell. REQUIRES: id.kind is not kVertex.
+  absl::Span<const VertexId> VerticesOf(EntityId id) const;
+
+  /// edges[k] joins vertices k and k + 1 of the face.
+  absl::Span<const EdgeId> Edges(FaceId f) const {
+    return absl::MakeConstSpan(&face_edges_[size_t{f.slot()} * face_stride_], FaceSize(f));
+  }
+  /// In template order.
+  absl::Span<const OrientedFace> Faces(CellId c) const {
+    return absl::MakeConstSpan(&cell_faces_[size_t{c.slot()} * cell_face_stride_],
+                               TemplateOf(Type(c)).num_faces);
+  }
+  /// Edge of the cell that its template calls `local_edge`: two table look-ups.
+  EdgeId Edge(CellId c, int local_edge) const;
+  /// A live cell other than `c` of the same type with the same faces, or an invalid id.
+  CellId FindTwin(CellId c) const;
+
+  absl::Span<const EdgeId> IncidentEdges(VertexId v) const { return vertex_edges_.Of(v.slot()); }
+  absl::Span<const FaceId> IncidentFaces(EdgeId e) const { return edge_faces_.Of(e.slot()); }
+  /// Valid until the next edit.
+  absl::Span<const CellId> IncidentCells(FaceId f) const;
+
+  /// The edge (not a duplicate) between two vertices in either direction, or an invalid id.
+  /// Cost: the smaller of the two vertices' degrees.
+  EdgeId FindEdge(VertexId a, VertexId b) const;
+  /// The face (not a duplicate) with this vertex cycle, in any rotation and either direction.
+  FaceId FindFace(absl::Span<const VertexId> vertices) const;
+
+  // ---- Boundary: known at any moment, listed without a traversal ----
+
+  /// Faces with exactly one cell use; edges of such faces, and edges with exactly one face use; vertices of
+  /// such edges. Empty for cells.
+  const BitSet& Boundary(EntityKind kind) const { return boundary_[Dimension(kind)]; }
+  bool IsOnBoundary(EntityId id) const { return Boundary(id.kind).Test(id.slot); }
+
+  // ---- Primitive edits ----
+
+  /// Errors: INVALID_ARGUMENT NON_FINITE_VALUE, RESOURCE_EXHAUSTED.
+  absl::StatusOr<VertexId> AddVertex(const Point& position);
+  /// Errors: FAILED_PRECONDITION VERTEX_IN_USE while it has incident edges.
+  absl::Status RemoveVertex(VertexId v);
+  /// Errors: INVALID_ARGUMENT NON_FINITE_VALUE.
+  absl::Status MoveVertex(VertexId v, const Point& position);
+
+  /// Adds an element; a derived face or edge with the same vertices becomes it and takes its vertex order.
+  /// Degenerate elements (a vertex named twice) are kept.
+  /// Errors: INVALID_ARGUMENT BAD_ELEMENT_TYPE, BAD_ARRAY_LENGTH, DUPLICATE_ELEMENT (if so opted);
+  /// RESOURCE_EXHAUSTED.
+  absl::StatusOr<EntityId> AddElement(ElementType type, absl::Span<const VertexId> vertices);
+  /// A face or edge that cells or faces still use stays as a derived one.
+  /// Errors: FAILED_PRECONDITION NOT_AN_ELEMENT.
+  absl::Status RemoveElement(EntityId id);
+
+  // ---- Attributes ----
+
+  const std::vector<AttributeColumn>& attributes() const { return attributes_; }
+  /// Index into attributes(), or -1.
+  int FindAttribute(absl::string_view name, EntityKind kind) const;
+  /// Adds a column of zeros. Errors: INVALID_ARGUMENT; ALREADY_EXISTS ATTRIBUTE_EXISTS; RESOURCE_EXHAUSTED.
+  absl::Status AddAttribute(const AttributeSpec& spec);
+  /// Sets the row of a live entity. Errors: INVALID_ARGUMENT BAD_ARRAY_LENGTH, NON_FINITE_VALUE.
+  /// REQUIRES: 0 <= column < attributes().size().
+  absl::Status SetAttribute(int column, Slot slot, absl::Span<const uint8_t> row);
+
+  // ---- Batches ----
+
+  /// Starts the journal. REQUIRES: no edit since the last Commit, no batch open.
+  void BeginBatch();
+  /// Makes the edits since the last Commit revision() + 1; freed slots may be used again.
+  /// Errors: RESOURCE_EXHAUSTED after 2^32 - 2 revisions; the batch stays open then.
+  absl::Status Commit();
+  /// Puts everything back to BeginBatch(), to the last id, stamp and list length. REQUIRES: a batch is open.
+  void Rollback();
+
+  // ---- Upkeep ----
+
+  /// Makes room for as many entities of each kind. Never fails; call it with counts that were checked.
+  void Reserve(const std::array<uint64_t, kNumEntityKinds>& counts);
+  const Checksum& checksum() const { return checksum_; }
+  /// Bytes of each array, and all of them.
+  std::vector<std::pair<std::string, size_t>> MemoryByArray() const;
+  size_t memory_bytes() const;
+
+ private:
+  friend class MeshValidator;
+  friend class MeshTestPeer;
+
+  static constexpr uint8_t kTypeMask = 7;
+  static constexpr uint8_t kElementFlag = 8;
+  static constexpr uint8_t kDuplicateFlag = 16;
+  static constexpr CellId kOverflow{kNoSlot - 1};
+  static constexpr uint32_t kHubDegree = 512;  ///< vertices of more edges find them through hub_edges_
+
+  using VertexSpan = absl::Span<const VertexId>;
+
+  /// A face that was found, and how it lies against the vertices that were asked for.
+  struct FaceMatch {
+    FaceId face;
+    FaceCode code;
+  };
+  /// What AddCell knows of a cell's edges and faces while it gathers them.
+  struct CellParts;
+
+  uint8_t& flags(EntityId id) { return flags_[Dimension(id.kind)][id.slot]; }
+  uint8_t flags(EntityId id) const { return flags_[Dimension(id.kind)][id.slot]; }
+  int FaceSize(FaceId f) const { return Type(f) == ElementType::kQuad ? 4 : 3; }
+  Stamp next_stamp() const { return static_cast<Stamp>(revision_ + 1); }
+  bool journaling() const { return batch_open_; }
+  Slots& mutable_slots(EntityKind kind) { return slots_[Dimension(kind)]; }
+
+  // mesh_edits.cc: checks, and the hierarchical creation behind the public edits
+  absl::Status CheckVertices(ElementType type, VertexSpan vertices) const;
+  absl::Status CheckRoom(ElementType type) const;
+  absl::StatusOr<EntityId> AddWireEdge(VertexSpan vertices);
+  absl::StatusOr<EntityId> AddFaceElement(VertexSpan vertices);
+  absl::StatusOr<EntityId> AddCell(ElementType type, VertexSpan vertices);
+  absl::Status RefuseDuplicate(EntityId existing) const;
+  CellId FindCell(ElementType type, const CellParts& parts) const;
+  bool HasFaces(CellId c, ElementType type, const CellParts& parts) const;
+  void FindCellParts(const ElementTemplate& shape, VertexSpan vertices, CellParts& parts) const;
+  FaceMatch FindFaceAround(EdgeId e, VertexSpan vertices) const;
+  EdgeId LeastUsed(absl::Span<const EdgeId> edges) const;
+  FaceMatch FindCellFace(const ElementTemplate& shape, int local_face, VertexSpan vertices,
+                         CellParts& parts) const;
+  EdgeId EnsureEdge(VertexId a, VertexId b);
+  void EnsureCellParts(const ElementTemplate& shape, VertexSpan vertices, CellParts& parts);
+
+  // mesh_links.cc: creating and destroying single entities with their links, counters and journal
+  EdgeId CreateEdge(VertexId a, VertexId b, uint8_t extra_flags);
+  FaceId CreateFace(VertexSpan vertices, absl::Span<const EdgeId> edges, uint8_t extra_flags);
+  CellId CreateCell(ElementType type, VertexSpan vertices, absl::Span<const OrientedFace> faces);
+  void DestroyVertex(VertexId v);
+  void DestroyEdge(EdgeId e);
+  void DestroyFace(FaceId f);
+  void DestroyCell(CellId c);
+  void ReleaseEdge(EdgeId e);  ///< destroys it if nothing needs it
+  void ReleaseFace(FaceId f);  ///< destroys it, and then its edges, if nothing needs it
+
+  void CountElement(EntityId id, int change);
+  void IndexHubEdges(VertexId v);
+  void IndexHubEdge(EdgeId e);
+  void LinkEdge(EdgeId e);
+  void UnlinkEdge(EdgeId e);
+  void LinkFace(FaceId f);
+  void UnlinkFace(FaceId f);
+  void LinkCell(CellId c);
+  void UnlinkCell(CellId c);
+  void AddFaceCell(FaceId f, CellId c);
+  void RemoveFaceCell(FaceId f, CellId c);
+  uint32_t NumFaceCells(FaceId f) const;
+  void AddEdgeFace(EdgeId e, FaceId f);
+  void RemoveEdgeFace(EdgeId e, FaceId f);
+  void SetFaceOnBoundary(FaceId f, int change);
+  void SetEdgeOnBoundary(EdgeId e, int change);
+  void CountBoundary(EntityId id, int change);
+
+  void SetElementFlag(EntityId id);
+  void ClearElementFlag(EntityId id);
+  void FlipEdge(EdgeId e);
+  void ReorderFace(FaceId f, FaceCode code);
+  void RecodeFace(CellId c, FaceId f);
+  FaceCode CodeInCell(CellId c, int local_face, FaceId f) const;
+
+  // mesh_duplicates.cc: keeping one primary for each vertex pair or cycle
+  void PassOnPrimary(EntityId id);
+  EdgeId FindDuplicateOf(EdgeId e) const;
+  FaceId FindDuplicateOf(FaceId f) const;
+  void MoveUsesTo(EdgeId from, EdgeId to);
+  void MoveUsesTo(FaceId from, FaceId to);
+  void ReplaceCellFace(CellId c, int local_face, FaceId to);
+  void ReplaceFaceEdge(FaceId f, int local_edge, EdgeId to);
+  void SetDuplicateFlag(EntityId id, bool duplicate);
+
+  uint64_t ElementTerm(EntityId id) const;
+  void Touch(EntityId id) { changed_[Dimension(id.kind)].Touch(id.slot, next_stamp()); }
+  void ZeroAttributes(EntityId id);
+  void WriteAttribute(int column, Slot slot, absl::Span<const uint8_t> row);
+
+  // mesh_storage.cc: rows by slot
+  Slot NewSlot(EntityKind kind, JournalEntry& entry);
+  void EnsureRow(EntityKind kind, Slot slot);
+  void WidenFaces(int stride);
+  void WidenCells(int vertex_stride, int face_stride);
+
+  // mesh_rollback.cc
+  void Record(const JournalEntry& entry) {
+    if (batch_open_) journal_.entries.push_back(entry);
+  }
+  void Undo(const JournalEntry& entry);
+  void UndoCreate(const JournalEntry& entry);
+  void UndoDestroy(const JournalEntry& entry);
+  void UndoMove(const JournalEntry& entry);
+  void UndoSetAttribute(const JournalEntry& entry);
+
+  MeshOptions options_;
+  int64_t revision_ = 0;
+  std::array<Slots, kNumEntityKinds> slots_;
+  std::array<StampColumn, kNumEntityKinds> changed_;
+  std::array<std::vector<uint8_t>, kNumEntityKinds> flags_;  ///< type | element | duplicate; none for vertices
+  std::array<uint32_t, kNumEntityKinds> num_elements_ = {};
+  std::array<uint32_t, kNumEntityKinds> num_duplicates_ = {};
+
+  std::vector<Point> positions_;
+  std::vector<std::array<VertexId, 2>> edge_vertices_;
+  int face_stride_ = 3;  ///< vertices and edges of a face: 3, or 4 once there was a quad
+  std::vector<VertexId> face_vertices_;
+  std::vector<EdgeId> face_edges_;
+  int cell_vertex_stride_ = 4;  ///< widest cell type so far
+  int cell_face_stride_ = 4;
+  std::vector<VertexId> cell_vertices_;
+  std::vector<OrientedFace> cell_faces_;
+
+  IncidenceLists<EdgeId> vertex_edges_;
+  IncidenceLists<FaceId> edge_faces_;
+  /// The uses of a face, or {index of a list in face_overflow_, kOverflow} when there are more than two.
+  std::vector<std::array<CellId, 2>> face_cells_;
+  IncidenceLists<CellId> face_overflow_;
+  std::vector<Slot> free_overflow_lists_;
+  Slot num_overflow_lists_ = 0;
+  /// Edges between two vertices that both have very many, by vertex pair, lower first.
+  absl::flat_hash_map<std::pair<VertexId, VertexId>, EdgeId> hub_edges_;
+
+  std::array<BitSet, kNumEntityKinds> boundary_;
+  std::array<std::vector<uint32_t>, kNumEntityKinds> boundary_uses_;  ///< of vertices and edges
+
+  std::vector<AttributeColumn> attributes_;
+  Checksum checksum_;
+  bool batch_open_ = false;
+  Journal journal_;
+};
+
+}  // namespace dynmesh
+
+#endif  // DYNMESH_CORE_MESH_MESH_H_

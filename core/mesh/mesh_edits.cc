@@ -1,0 +1,314 @@
+// Hierarchical creation: which edges and faces of a new element exist already, and which must be made.
+
+#include <algorithm>
+
+#include "absl/strings/str_cat.h"
+#include "core/mesh/mesh.h"
+
+namespace dynmesh {
+namespace {
+
+/// Beyond as many faces on a smart edge, a face is looked for round the least used of its edges.
+constexpr uint32_t kCrowded = 16;
+
+/// Vertices of one face of a cell, in the template's outward order.
+struct FaceVertices {
+  FaceVertices(const LocalFace& face, absl::Span<const VertexId> cell) : size(face.size) {
+    for (int k = 0; k < size; ++k) vertices[k] = cell[face.vertices[k]];
+  }
+  absl::Span<const VertexId> span() const { return absl::MakeConstSpan(vertices.data(), size); }
+
+  int size;
+  std::array<VertexId, kMaxFaceVertices> vertices;
+};
+
+}  // namespace
+
+struct Mesh::CellParts {
+  std::array<EdgeId, kMaxElementEdges> edges;
+  std::array<FaceMatch, kMaxElementFaces> faces;
+};
+
+absl::optional<FaceCode> MatchFace(absl::Span<const VertexId> stored, absl::Span<const VertexId> key) {
+  const int n = stored.size();
+  if (key.size() != stored.size()) return absl::nullopt;
+  for (int value = 0; value < 8; ++value) {
+    const FaceCode code{static_cast<uint8_t>(value)};
+    if (code.rotation() >= n || stored[code.rotation()] != key[0]) continue;
+    int k = 1;
+    while (k < n && stored[code.StoredVertex(k, n)] == key[k]) ++k;
+    if (k == n) return code;
+  }
+  return absl::nullopt;
+}
+
+// ---- Checks ----
+
+absl::StatusOr<EntityId> Mesh::AddElement(ElementType type, absl::Span<const VertexId> vertices) {
+  DYNMESH_RETURN_IF_ERROR(CheckVertices(type, vertices));
+  DYNMESH_RETURN_IF_ERROR(CheckRoom(type));
+  switch (KindOf(type)) {
+    case EntityKind::kEdge:
+      return AddWireEdge(vertices);
+    case EntityKind::kFace:
+      return AddFaceElement(vertices);
+    default:
+      return AddCell(type, vertices);
+  }
+}
+
+absl::Status Mesh::CheckVertices(ElementType type, VertexSpan vertices) const {
+  if (!IsElementType(static_cast<int>(type))) {
+    return InvalidArgument(reason::kBadElementType,
+                           absl::StrCat("element type ", static_cast<int>(type), " is none of 1-7"));
+  }
+  if (vertices.size() != static_cast<size_t>(NumVertices(type))) {
+    return InvalidArgument(reason::kBadArrayLength,
+                           absl::StrCat("a ", ElementTypeName(type), " has ", NumVertices(type),
+                                        " vertices, not ", vertices.size()));
+  }
+  for (VertexId v : vertices) DYNMESH_RETURN_IF_ERROR(CheckLive(v));
+  return absl::OkStatus();
+}
+
+absl::Status Mesh::CheckRoom(ElementType type) const {
+  constexpr absl::string_view kLimitNames[] = {"max_vertices", "max_edges", "max_faces", "max_cells"};
+  const ElementTemplate& shape = TemplateOf(type);
+  const uint32_t needed[] = {0, shape.num_edges, shape.num_faces, shape.kind == EntityKind::kCell};
+  for (int kind = 1; kind < kNumEntityKinds; ++kind) {
+    const uint32_t limit = options_.limits.max_slots[kind];
+    if (!slots_[kind].CanAllocate(needed[kind], limit)) {
+      return LimitExceeded(kLimitNames[kind], limit, uint64_t{slots_[kind].num_live()} + needed[kind]);
+    }
+  }
+  if (!vertex_edges_.HasRoom(kMaxElementEdges) || !edge_faces_.HasRoom(kMaxElementEdges) ||
+      !face_overflow_.HasRoom(kMaxElementFaces)) {
+    return LimitExceeded("max_incident_entities", IncidenceLists<EdgeId>::kMaxLength,
+                         uint64_t{IncidenceLists<EdgeId>::kMaxLength} + 1);
+  }
+  return absl::OkStatus();
+}
+
+absl::Status Mesh::RefuseDuplicate(EntityId existing) const {
+  return InvalidArgument(reason::kDuplicateElement,
+                         absl::StrCat("the element equals ", EntityKindName(existing.kind), " ", existing.slot),
+                         {{"kind", std::string(EntityKindName(existing.kind))},
+                          {"ids", absl::StrCat(existing.slot)}});
+}
+
+// ---- Look-up ----
+
+EdgeId Mesh::FindEdge(VertexId a, VertexId b) const {
+  if (vertex_edges_.Length(b.slot()) < vertex_edges_.Length(a.slot())) std::swap(a, b);
+  const auto edges = IncidentEdges(a);
+  if (edges.size() > kHubDegree) {
+    const auto it = hub_edges_.find(std::minmax(a, b));
+    return it == hub_edges_.end() ? EdgeId() : it->second;
+  }
+  for (EdgeId e : edges) {
+    const auto& ends = edge_vertices_[e.slot()];
+    const bool joins = (ends[0] == a && ends[1] == b) || (ends[0] == b && ends[1] == a);
+    if (joins && !IsDuplicate(e)) return e;
+  }
+  return EdgeId();
+}
+
+FaceId Mesh::FindFace(absl::Span<const VertexId> vertices) const {
+  std::array<EdgeId, kMaxFaceVertices> edges;
+  const size_t n = vertices.size();
+  if (n < 3 || n > kMaxFaceVertices) return FaceId();
+  for (size_t k = 0; k < n; ++k) {
+    edges[k] = FindEdge(vertices[k], vertices[(k + 1) % n]);
+    if (!edges[k].valid()) return FaceId();
+  }
+  return FindFaceAround(LeastUsed(absl::MakeConstSpan(edges.data(), n)), vertices).face;
+}
+
+EdgeId Mesh::LeastUsed(absl::Span<const EdgeId> edges) const {
+  return *std::min_element(edges.begin(), edges.end(), [this](EdgeId a, EdgeId b) {
+    return edge_faces_.Length(a.slot()) < edge_faces_.Length(b.slot());
+  });
+}
+
+Mesh::FaceMatch Mesh::FindFaceAround(EdgeId e, VertexSpan vertices) const {
+  for (FaceId f : IncidentFaces(e)) {
+    if (IsDuplicate(f)) continue;
+    if (const auto code = MatchFace(Vertices(f), vertices)) return {f, *code};
+  }
+  return {};
+}
+
+Mesh::FaceMatch Mesh::FindCellFace(const ElementTemplate& shape, int local_face, VertexSpan vertices,
+                                   CellParts& parts) const {
+  const LocalFace& face = shape.faces[local_face];
+  EdgeId around = parts.edges[shape.smart_edges[shape.smart_edge_of_face[local_face]]];
+  if (!around.valid()) return {};  // a face on a new edge is new
+  if (edge_faces_.Length(around.slot()) > kCrowded) {
+    for (int k = 0; k < face.size; ++k) {
+      EdgeId& e = parts.edges[face.edges[k]];
+      const LocalEdge& ends = shape.edges[face.edges[k]];
+      if (!e.valid()) e = FindEdge(vertices[ends.vertices[0]], vertices[ends.vertices[1]]);
+      if (!e.valid()) return {};
+      if (edge_faces_.Length(e.slot()) < edge_faces_.Length(around.slot())) around = e;
+    }
+  }
+  return FindFaceAround(around, FaceVertices(face, vertices).span());
+}
+
+void Mesh::FindCellParts(const ElementTemplate& shape, VertexSpan vertices, CellParts& parts) const {
+  for (int s = 0; s < shape.num_smart_edges; ++s) {
+    const LocalEdge& ends = shape.edges[shape.smart_edges[s]];
+    parts.edges[shape.smart_edges[s]] = FindEdge(vertices[ends.vertices[0]], vertices[ends.vertices[1]]);
+  }
+  for (int i = 0; i < shape.num_faces; ++i) {
+    parts.faces[i] = FindCellFace(shape, i, vertices, parts);
+    if (!parts.faces[i].face.valid()) continue;
+    const auto edges = Edges(parts.faces[i].face);
+    for (size_t k = 0; k < edges.size(); ++k) {
+      parts.edges[shape.faces[i].edges[k]] = edges[parts.faces[i].code.StoredEdge(k, edges.size())];
+    }
+  }
+}
+
+bool Mesh::HasFaces(CellId c, ElementType type, const CellParts& parts) const {
+  if (Type(c) != type) return false;
+  const auto faces = Faces(c);
+  return std::all_of(faces.begin(), faces.end(), [&](OrientedFace oriented) {
+    return std::any_of(parts.faces.begin(), parts.faces.begin() + faces.size(),
+                       [&](const FaceMatch& match) { return match.face == oriented.face(); });
+  });
+}
+
+CellId Mesh::FindCell(ElementType type, const CellParts& parts) const {
+  const int num_faces = TemplateOf(type).num_faces;
+  const auto least_used = std::min_element(
+      parts.faces.begin(), parts.faces.begin() + num_faces, [this](const FaceMatch& a, const FaceMatch& b) {
+        return (a.face.valid() ? NumFaceCells(a.face) : 0) < (b.face.valid() ? NumFaceCells(b.face) : 0);
+      });
+  if (!least_used->face.valid()) return CellId();
+  for (CellId c : IncidentCells(least_used->face)) {
+    if (HasFaces(c, type, parts)) return c;
+  }
+  return CellId();
+}
+
+CellId Mesh::FindTwin(CellId c) const {
+  const auto faces = Faces(c);
+  CellParts parts;
+  for (size_t i = 0; i < faces.size(); ++i) parts.faces[i] = {faces[i].face(), faces[i].code()};
+  for (CellId other : IncidentCells(faces[0].face())) {
+    if (other != c && HasFaces(other, Type(c), parts)) return other;
+  }
+  return CellId();
+}
+
+// ---- Creation ----
+
+EdgeId Mesh::EnsureEdge(VertexId a, VertexId b) {
+  const EdgeId e = FindEdge(a, b);
+  return e.valid() ? e : CreateEdge(a, b, 0);
+}
+
+absl::StatusOr<EntityId> Mesh::AddWireEdge(VertexSpan vertices) {
+  const EdgeId existing = FindEdge(vertices[0], vertices[1]);
+  if (!existing.valid()) return CreateEdge(vertices[0], vertices[1], kElementFlag);
+  if (!IsElement(existing)) {
+    if (Vertices(existing)[0] != vertices[0]) FlipEdge(existing);
+    SetElementFlag(existing);
+    return existing;
+  }
+  if (options_.duplicates == DuplicatePolicy::kRefuse) return RefuseDuplicate(existing);
+  return CreateEdge(vertices[0], vertices[1], kElementFlag | kDuplicateFlag);
+}
+
+absl::StatusOr<EntityId> Mesh::AddFaceElement(VertexSpan vertices) {
+  const size_t n = vertices.size();
+  std::array<EdgeId, kMaxFaceVertices> edges;
+  for (size_t k = 0; k < n; ++k) edges[k] = FindEdge(vertices[k], vertices[(k + 1) % n]);
+  const auto edge_span = absl::MakeConstSpan(edges.data(), n);
+  const bool all_exist =
+      std::all_of(edge_span.begin(), edge_span.end(), [](EdgeId e) { return e.valid(); });
+  const FaceMatch match = all_exist ? FindFaceAround(LeastUsed(edge_span), vertices) : FaceMatch();
+  if (match.face.valid() && !IsElement(match.face)) {
+    ReorderFace(match.face, match.code);
+    SetElementFlag(match.face);
+    return match.face;
+  }
+  if (match.face.valid() && options_.duplicates == DuplicatePolicy::kRefuse) return RefuseDuplicate(match.face);
+  for (size_t k = 0; k < n; ++k) {
+    if (!edges[k].valid()) edges[k] = EnsureEdge(vertices[k], vertices[(k + 1) % n]);
+  }
+  WidenFaces(n);
+  return CreateFace(vertices, edge_span, kElementFlag | (match.face.valid() ? kDuplicateFlag : 0));
+}
+
+absl::StatusOr<EntityId> Mesh::AddCell(ElementType type, VertexSpan vertices) {
+  const ElementTemplate& shape = TemplateOf(type);
+  CellParts parts;
+  FindCellParts(shape, vertices, parts);
+  if (options_.duplicates == DuplicatePolicy::kRefuse) {
+    if (const CellId twin = FindCell(type, parts); twin.valid()) return RefuseDuplicate(twin);
+  }
+  EnsureCellParts(shape, vertices, parts);
+  std::array<OrientedFace, kMaxElementFaces> faces;
+  for (int i = 0; i < shape.num_faces; ++i) faces[i] = OrientedFace(parts.faces[i].face, parts.faces[i].code);
+  WidenCells(shape.num_vertices, shape.num_faces);
+  return CreateCell(type, vertices, absl::MakeConstSpan(faces.data(), shape.num_faces));
+}
+
+/// Whether a vertex is named twice.
+static bool HasRepeats(absl::Span<const VertexId> vertices) {
+  for (auto it = vertices.begin(); it != vertices.end(); ++it) {
+    if (std::find(it + 1, vertices.end(), *it) != vertices.end()) return true;
+  }
+  return false;
+}
+
+void Mesh::EnsureCellParts(const ElementTemplate& shape, VertexSpan vertices, CellParts& parts) {
+  const bool degenerate = HasRepeats(vertices);
+  for (int e = 0; e < shape.num_edges; ++e) {
+    const LocalEdge& ends = shape.edges[e];
+    if (!parts.edges[e].valid()) parts.edges[e] = EnsureEdge(vertices[ends.vertices[0]], vertices[ends.vertices[1]]);
+  }
+  for (int i = 0; i < shape.num_faces; ++i) {
+    if (parts.faces[i].face.valid()) continue;
+    const FaceVertices face(shape.faces[i], vertices);
+    std::array<EdgeId, kMaxFaceVertices> edges;
+    for (int k = 0; k < face.size; ++k) edges[k] = parts.edges[shape.faces[i].edges[k]];
+    const auto edge_span = absl::MakeConstSpan(edges.data(), face.size);
+    // Two faces of a degenerate cell may be the same: look again among those just made.
+    if (degenerate) parts.faces[i] = FindFaceAround(LeastUsed(edge_span), face.span());
+    if (parts.faces[i].face.valid()) continue;
+    WidenFaces(face.size);
+    parts.faces[i] = {CreateFace(face.span(), edge_span, 0), FaceCode()};
+  }
+}
+
+// ---- Removal ----
+
+absl::Status Mesh::RemoveElement(EntityId id) {
+  if (id.kind == EntityKind::kVertex) {
+    return InvalidArgument(reason::kBadEntityKind, "vertices are not elements");
+  }
+  DYNMESH_RETURN_IF_ERROR(CheckLive(id));
+  if (!IsElement(id)) {
+    return FailedPrecondition(
+        reason::kNotAnElement,
+        absl::StrCat(EntityKindName(id.kind), " ", id.slot, " is derived: remove the elements that use it"),
+        {{"kind", std::string(EntityKindName(id.kind))}, {"ids", absl::StrCat(id.slot)}});
+  }
+  if (id.kind == EntityKind::kCell) {
+    DestroyCell(CellId(id.slot));
+    return absl::OkStatus();
+  }
+  PassOnPrimary(id);
+  ClearElementFlag(id);
+  if (id.kind == EntityKind::kFace) {
+    ReleaseFace(FaceId(id.slot));
+  } else {
+    ReleaseEdge(EdgeId(id.slot));
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace dynmesh

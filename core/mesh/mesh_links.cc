@@ -1,0 +1,280 @@
+// Single entities: creating and destroying them with their links, boundary counters, checksum terms and
+// journal entries. Everything that Rollback has to undo happens here.
+
+#include <algorithm>
+
+#include "core/mesh/mesh.h"
+
+namespace dynmesh {
+
+// ---- Create ----
+
+EdgeId Mesh::CreateEdge(VertexId a, VertexId b, uint8_t extra_flags) {
+  JournalEntry entry;
+  const EdgeId e(NewSlot(EntityKind::kEdge, entry));
+  edge_vertices_[e.slot()] = {a, b};
+  flags(e) = static_cast<uint8_t>(ElementType::kWireEdge) | extra_flags;
+  if (IsDuplicate(e)) ++num_duplicates_[1];
+  LinkEdge(e);
+  if (IsElement(e)) CountElement(e, +1);
+  Record(entry);
+  return e;
+}
+
+FaceId Mesh::CreateFace(VertexSpan vertices, absl::Span<const EdgeId> edges, uint8_t extra_flags) {
+  JournalEntry entry;
+  const FaceId f(NewSlot(EntityKind::kFace, entry));
+  const size_t row = size_t{f.slot()} * face_stride_;
+  std::copy(vertices.begin(), vertices.end(), face_vertices_.begin() + row);
+  std::copy(edges.begin(), edges.end(), face_edges_.begin() + row);
+  const ElementType type = vertices.size() == 4 ? ElementType::kQuad : ElementType::kTriangle;
+  flags(f) = static_cast<uint8_t>(type) | extra_flags;
+  if (IsDuplicate(f)) ++num_duplicates_[2];
+  LinkFace(f);
+  if (IsElement(f)) CountElement(f, +1);
+  Record(entry);
+  return f;
+}
+
+CellId Mesh::CreateCell(ElementType type, VertexSpan vertices, absl::Span<const OrientedFace> faces) {
+  JournalEntry entry;
+  const CellId c(NewSlot(EntityKind::kCell, entry));
+  std::copy(vertices.begin(), vertices.end(), cell_vertices_.begin() + size_t{c.slot()} * cell_vertex_stride_);
+  std::copy(faces.begin(), faces.end(), cell_faces_.begin() + size_t{c.slot()} * cell_face_stride_);
+  flags(c) = static_cast<uint8_t>(type) | kElementFlag;
+  LinkCell(c);
+  CountElement(c, +1);
+  Record(entry);
+  return c;
+}
+
+// ---- Destroy ----
+
+void Mesh::DestroyVertex(VertexId v) {
+  ZeroAttributes(v);
+  Record({JournalOp::kDestroy, EntityKind::kVertex, v.slot(), 0, changed(EntityKind::kVertex).At(v.slot())});
+  checksum_.topology -= Checksum::VertexTerm(v.slot());
+  checksum_.geometry -= Checksum::PositionTerm(v.slot(), Position(v));
+  Touch(v);
+  mutable_slots(EntityKind::kVertex).Free(v.slot());
+}
+
+void Mesh::DestroyEdge(EdgeId e) {
+  ZeroAttributes(e);
+  Record({JournalOp::kDestroy, EntityKind::kEdge, e.slot(), 0, 0});
+  if (IsDuplicate(e)) --num_duplicates_[1];
+  UnlinkEdge(e);
+  mutable_slots(EntityKind::kEdge).Free(e.slot());
+}
+
+void Mesh::DestroyFace(FaceId f) {
+  ZeroAttributes(f);
+  Record({JournalOp::kDestroy, EntityKind::kFace, f.slot(), 0, 0});
+  if (IsDuplicate(f)) --num_duplicates_[2];
+  UnlinkFace(f);
+  mutable_slots(EntityKind::kFace).Free(f.slot());
+  for (EdgeId e : Edges(f)) ReleaseEdge(e);
+}
+
+void Mesh::DestroyCell(CellId c) {
+  ZeroAttributes(c);
+  Record({JournalOp::kDestroy, EntityKind::kCell, c.slot(), 0, changed(EntityKind::kCell).At(c.slot())});
+  UnlinkCell(c);
+  CountElement(c, -1);
+  mutable_slots(EntityKind::kCell).Free(c.slot());
+  for (OrientedFace oriented : Faces(c)) ReleaseFace(oriented.face());
+}
+
+void Mesh::ReleaseEdge(EdgeId e) {
+  if (IsLive(e) && !IsElement(e) && IncidentFaces(e).empty()) DestroyEdge(e);
+}
+
+void Mesh::ReleaseFace(FaceId f) {
+  if (IsLive(f) && !IsElement(f) && NumFaceCells(f) == 0) DestroyFace(f);
+}
+
+// ---- Links ----
+
+void Mesh::LinkEdge(EdgeId e) {
+  for (VertexId v : Vertices(e)) {
+    vertex_edges_.Add(v.slot(), e);
+    if (vertex_edges_.Length(v.slot()) == kHubDegree + 1) IndexHubEdges(v);
+  }
+  IndexHubEdge(e);
+}
+
+void Mesh::UnlinkEdge(EdgeId e) {
+  const auto [a, b] = edge_vertices_[e.slot()];
+  if (!hub_edges_.empty()) {
+    const auto it = hub_edges_.find(std::minmax(a, b));
+    if (it != hub_edges_.end() && it->second == e) hub_edges_.erase(it);
+  }
+  vertex_edges_.Remove(a.slot(), e);
+  vertex_edges_.Remove(b.slot(), e);
+}
+
+void Mesh::IndexHubEdges(VertexId v) {
+  for (EdgeId e : IncidentEdges(v)) IndexHubEdge(e);
+}
+
+void Mesh::IndexHubEdge(EdgeId e) {
+  const auto [a, b] = edge_vertices_[e.slot()];
+  if (vertex_edges_.Length(a.slot()) <= kHubDegree || vertex_edges_.Length(b.slot()) <= kHubDegree) return;
+  if (!IsDuplicate(e)) hub_edges_[std::minmax(a, b)] = e;
+}
+
+void Mesh::LinkFace(FaceId f) {
+  face_cells_[f.slot()] = {CellId(), CellId()};
+  for (EdgeId e : Edges(f)) AddEdgeFace(e, f);
+}
+
+void Mesh::UnlinkFace(FaceId f) {
+  for (EdgeId e : Edges(f)) RemoveEdgeFace(e, f);
+}
+
+void Mesh::LinkCell(CellId c) {
+  for (OrientedFace oriented : Faces(c)) AddFaceCell(oriented.face(), c);
+}
+
+void Mesh::UnlinkCell(CellId c) {
+  for (OrientedFace oriented : Faces(c)) RemoveFaceCell(oriented.face(), c);
+}
+
+uint32_t Mesh::NumFaceCells(FaceId f) const { return IncidentCells(f).size(); }
+
+void Mesh::AddFaceCell(FaceId f, CellId c) {
+  auto& uses = face_cells_[f.slot()];
+  if (uses[1] == kOverflow) {
+    face_overflow_.Add(uses[0].slot(), c);
+  } else if (uses[1].valid()) {
+    Slot list = num_overflow_lists_;
+    if (free_overflow_lists_.empty()) {
+      ++num_overflow_lists_;
+    } else {
+      list = free_overflow_lists_.back();
+      free_overflow_lists_.pop_back();
+    }
+    for (CellId use : {uses[0], uses[1], c}) face_overflow_.Add(list, use);
+    uses = {CellId(list), kOverflow};
+  } else if (uses[0].valid()) {
+    uses[1] = c;
+    SetFaceOnBoundary(f, -1);
+  } else {
+    uses[0] = c;
+    SetFaceOnBoundary(f, +1);
+  }
+}
+
+void Mesh::RemoveFaceCell(FaceId f, CellId c) {
+  auto& uses = face_cells_[f.slot()];
+  if (uses[1] == kOverflow) {
+    const Slot list = uses[0].slot();
+    face_overflow_.Remove(list, c);
+    if (face_overflow_.Length(list) > 2) return;
+    const auto rest = face_overflow_.Of(list);
+    uses = {rest[0], rest[1]};
+    for (CellId use : uses) face_overflow_.Remove(list, use);
+    free_overflow_lists_.push_back(list);
+  } else if (uses[1].valid()) {
+    if (uses[0] == c) uses[0] = uses[1];
+    uses[1] = CellId();
+    SetFaceOnBoundary(f, +1);
+  } else {
+    uses[0] = CellId();
+    SetFaceOnBoundary(f, -1);
+  }
+}
+
+void Mesh::AddEdgeFace(EdgeId e, FaceId f) {
+  const uint32_t before = edge_faces_.Length(e.slot());
+  edge_faces_.Add(e.slot(), f);
+  if (before < 2) SetEdgeOnBoundary(e, before == 0 ? +1 : -1);
+}
+
+void Mesh::RemoveEdgeFace(EdgeId e, FaceId f) {
+  edge_faces_.Remove(e.slot(), f);
+  const uint32_t after = edge_faces_.Length(e.slot());
+  if (after < 2) SetEdgeOnBoundary(e, after == 0 ? -1 : +1);
+}
+
+// ---- Boundary ----
+
+void Mesh::SetFaceOnBoundary(FaceId f, int change) {
+  boundary_[2].Assign(f.slot(), change > 0);
+  for (EdgeId e : Edges(f)) CountBoundary(e, change);
+  for (VertexId v : Vertices(f)) CountBoundary(v, change);
+}
+
+void Mesh::SetEdgeOnBoundary(EdgeId e, int change) {
+  CountBoundary(e, change);
+  for (VertexId v : Vertices(e)) CountBoundary(v, change);
+}
+
+void Mesh::CountBoundary(EntityId id, int change) {
+  uint32_t& uses = boundary_uses_[Dimension(id.kind)][id.slot];
+  const uint32_t before = uses;
+  uses += change;
+  if ((before == 0) != (uses == 0)) boundary_[Dimension(id.kind)].Assign(id.slot, uses != 0);
+}
+
+// ---- Flags and order ----
+
+uint64_t Mesh::ElementTerm(EntityId id) const {
+  return Checksum::ElementTerm(Type(id), id.slot, VerticesOf(id));
+}
+
+void Mesh::CountElement(EntityId id, int change) {
+  num_elements_[Dimension(id.kind)] += change;
+  checksum_.topology += change > 0 ? ElementTerm(id) : -ElementTerm(id);
+  Touch(id);
+}
+
+void Mesh::SetElementFlag(EntityId id) {
+  Record({JournalOp::kSetElement, id.kind, id.slot, 0, changed(id.kind).At(id.slot)});
+  flags(id) |= kElementFlag;
+  CountElement(id, +1);
+}
+
+void Mesh::ClearElementFlag(EntityId id) {
+  Record({JournalOp::kClearElement, id.kind, id.slot, 0, changed(id.kind).At(id.slot)});
+  CountElement(id, -1);
+  flags(id) &= ~kElementFlag;
+}
+
+void Mesh::FlipEdge(EdgeId e) {
+  Record({JournalOp::kFlipEdge, EntityKind::kEdge, e.slot(), 0, 0});
+  std::swap(edge_vertices_[e.slot()][0], edge_vertices_[e.slot()][1]);
+}
+
+void Mesh::ReorderFace(FaceId f, FaceCode code) {
+  const int n = FaceSize(f);
+  const int back = code.flipped() ? code.rotation() : (n - code.rotation()) % n;
+  Record({JournalOp::kReorderFace, EntityKind::kFace, f.slot(),
+          static_cast<uint32_t>(back | (code.flipped() ? 4 : 0)), 0});
+  std::array<VertexId, kMaxFaceVertices> vertices;
+  std::array<EdgeId, kMaxFaceVertices> edges;
+  std::copy(Vertices(f).begin(), Vertices(f).end(), vertices.begin());
+  std::copy(Edges(f).begin(), Edges(f).end(), edges.begin());
+  for (int k = 0; k < n; ++k) {
+    face_vertices_[size_t{f.slot()} * face_stride_ + k] = vertices[code.StoredVertex(k, n)];
+    face_edges_[size_t{f.slot()} * face_stride_ + k] = edges[code.StoredEdge(k, n)];
+  }
+  for (CellId c : IncidentCells(f)) RecodeFace(c, f);
+}
+
+void Mesh::RecodeFace(CellId c, FaceId f) {
+  const ElementTemplate& shape = TemplateOf(Type(c));
+  for (int i = 0; i < shape.num_faces; ++i) {
+    OrientedFace& oriented = cell_faces_[size_t{c.slot()} * cell_face_stride_ + i];
+    if (oriented.face() == f) oriented = OrientedFace(f, CodeInCell(c, i, f));
+  }
+}
+
+FaceCode Mesh::CodeInCell(CellId c, int local_face, FaceId f) const {
+  const LocalFace& face = TemplateOf(Type(c)).faces[local_face];
+  std::array<VertexId, kMaxFaceVertices> key;
+  for (int k = 0; k < face.size; ++k) key[k] = Vertices(c)[face.vertices[k]];
+  return *MatchFace(Vertices(f), absl::MakeConstSpan(key.data(), face.size));
+}
+
+}  // namespace dynmesh

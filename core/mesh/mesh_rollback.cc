@@ -1,0 +1,123 @@
+// Undoing journal entries, last first.
+//
+// A slot that was freed in the batch has had no other occupant since, so the arrays still hold what stood there:
+// putting an entity back means linking it again.
+
+#include "core/mesh/mesh.h"
+
+namespace dynmesh {
+
+void Mesh::Rollback() {
+  batch_open_ = false;
+  while (!journal_.entries.empty()) {
+    const JournalEntry entry = journal_.entries.back();
+    journal_.entries.pop_back();
+    Undo(entry);
+  }
+  journal_.Clear();
+}
+
+void Mesh::Undo(const JournalEntry& entry) {
+  const EntityId id(entry.kind, entry.slot);
+  switch (entry.op) {
+    case JournalOp::kCreate:
+      return UndoCreate(entry);
+    case JournalOp::kDestroy:
+      return UndoDestroy(entry);
+    case JournalOp::kSetElement:
+      ClearElementFlag(id);
+      return changed_[Dimension(id.kind)].Restore(id.slot, entry.b);
+    case JournalOp::kClearElement:
+      SetElementFlag(id);
+      return changed_[Dimension(id.kind)].Restore(id.slot, entry.b);
+    case JournalOp::kSetDuplicate:
+      return SetDuplicateFlag(id, false);
+    case JournalOp::kClearDuplicate:
+      return SetDuplicateFlag(id, true);
+    case JournalOp::kFlipEdge:
+      return FlipEdge(EdgeId(id.slot));
+    case JournalOp::kReorderFace:
+      return ReorderFace(FaceId(id.slot), FaceCode{static_cast<uint8_t>(entry.a)});
+    case JournalOp::kReplaceCellFace:
+      return ReplaceCellFace(CellId(id.slot), entry.a, FaceId(entry.b));
+    case JournalOp::kReplaceFaceEdge:
+      return ReplaceFaceEdge(FaceId(id.slot), entry.a, EdgeId(entry.b));
+    case JournalOp::kMoveVertex:
+      return UndoMove(entry);
+    case JournalOp::kAddAttribute:
+      return attributes_.pop_back();
+    case JournalOp::kSetAttribute:
+      return UndoSetAttribute(entry);
+  }
+}
+
+void Mesh::UndoCreate(const JournalEntry& entry) {
+  switch (entry.kind) {
+    case EntityKind::kVertex: {
+      const VertexId v(entry.slot);
+      checksum_.topology -= Checksum::VertexTerm(v.slot());
+      checksum_.geometry -= Checksum::PositionTerm(v.slot(), Position(v));
+      break;
+    }
+    case EntityKind::kEdge:
+      UnlinkEdge(EdgeId(entry.slot));
+      break;
+    case EntityKind::kFace:
+      UnlinkFace(FaceId(entry.slot));
+      break;
+    case EntityKind::kCell:
+      UnlinkCell(CellId(entry.slot));
+      break;
+  }
+  const EntityId id(entry.kind, entry.slot);
+  if (IsElement(id)) CountElement(id, -1);
+  if (IsDuplicate(id)) --num_duplicates_[Dimension(id.kind)];
+  mutable_slots(entry.kind).UndoAllocate(entry.slot, entry.a);
+  changed_[Dimension(entry.kind)].Restore(entry.slot, entry.b);
+}
+
+void Mesh::UndoDestroy(const JournalEntry& entry) {
+  mutable_slots(entry.kind).UndoFree(entry.slot);
+  switch (entry.kind) {
+    case EntityKind::kVertex: {
+      const VertexId v(entry.slot);
+      checksum_.topology += Checksum::VertexTerm(v.slot());
+      checksum_.geometry += Checksum::PositionTerm(v.slot(), Position(v));
+      break;
+    }
+    case EntityKind::kEdge:
+      LinkEdge(EdgeId(entry.slot));
+      break;
+    case EntityKind::kFace:
+      LinkFace(FaceId(entry.slot));
+      break;
+    case EntityKind::kCell:
+      LinkCell(CellId(entry.slot));
+      CountElement(CellId(entry.slot), +1);
+      break;
+  }
+  const EntityId id(entry.kind, entry.slot);
+  if (IsDuplicate(id)) ++num_duplicates_[Dimension(id.kind)];
+  if (entry.kind == EntityKind::kVertex || entry.kind == EntityKind::kCell) {
+    changed_[Dimension(entry.kind)].Restore(entry.slot, entry.b);
+  }
+}
+
+void Mesh::UndoMove(const JournalEntry& entry) {
+  const VertexId v(entry.slot);
+  checksum_.geometry -= Checksum::PositionTerm(v.slot(), Position(v));
+  positions_[v.slot()] = journal_.positions.back();
+  journal_.positions.pop_back();
+  checksum_.geometry += Checksum::PositionTerm(v.slot(), Position(v));
+  changed_[0].Restore(v.slot(), entry.b);
+}
+
+void Mesh::UndoSetAttribute(const JournalEntry& entry) {
+  AttributeColumn& column = attributes_[entry.a];
+  const size_t row_bytes = column.spec().row_bytes();
+  const auto row = absl::MakeConstSpan(journal_.rows).last(row_bytes);
+  column.RestoreRow(entry.slot, row, entry.b);
+  journal_.rows.resize(journal_.rows.size() - row_bytes);
+}
+
+}  // namespace dynmesh

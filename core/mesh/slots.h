@@ -1,0 +1,106 @@
+#ifndef DYNMESH_CORE_MESH_SLOTS_H_
+#define DYNMESH_CORE_MESH_SLOTS_H_
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "core/mesh/bit_set.h"
+#include "core/mesh/ids.h"
+#include "core/mesh/stamps.h"
+
+namespace dynmesh {
+
+/// Which slots of one kind are live, when their occupants were born, and which may be used again.
+///
+/// A freed slot goes into quarantine until EndQuarantine() (called at each commit), so within a batch no
+/// slot has two occupants; what stood in its arrays stays readable and can be put back. After that the
+/// lowest free slot is handed out first.
+/// Cost: all O(1), but Allocate which skips 4096 used slots at a time.
+class Slots {
+ public:
+  struct Allocation {
+    Slot slot;
+    Stamp born_before;  ///< birth of the occupant before, 0 for a slot that was never used
+  };
+
+  /// The lowest reusable slot, or a new one at the end.
+  Allocation Allocate(Stamp born) {
+    Slot slot = free_.empty() ? kNoSlot : free_.Next(first_free_hint_);
+    if (slot == kNoSlot) {
+      slot = limit_++;
+    } else {
+      free_.Clear(slot);
+      first_free_hint_ = slot;
+    }
+    live_.Set(slot);
+    if (slot >= born_.size()) born_.resize(slot + 1);
+    const Stamp born_before = born_[slot];
+    born_[slot] = born;
+    return {slot, born_before};
+  }
+
+  /// Whether Allocate() can be called `count` times without the limit passing `max_slots`.
+  bool CanAllocate(uint32_t count, uint32_t max_slots) const {
+    return limit_ <= max_slots && free_.size() + (max_slots - limit_) >= count;
+  }
+
+  /// Ends the life at `slot` and quarantines it.
+  void Free(Slot slot) {
+    live_.Clear(slot);
+    quarantine_.push_back(slot);
+  }
+
+  /// Undoes the latest Free(slot) that was not undone. REQUIRES: no EndQuarantine() since.
+  void UndoFree(Slot slot) {
+    quarantine_.pop_back();
+    live_.Set(slot);
+  }
+
+  /// Undoes the latest Allocate() that was not undone, which gave `slot` when its stamp was `born_before`.
+  void UndoAllocate(Slot slot, Stamp born_before) {
+    live_.Clear(slot);
+    born_[slot] = born_before;  // so that a slot beyond the limit reads as never used
+    if (born_before == 0 && slot + 1 == limit_) {
+      --limit_;
+    } else {
+      MakeFree(slot);
+    }
+  }
+
+  /// Slots freed so far may be handed out again.
+  void EndQuarantine() {
+    for (Slot slot : quarantine_) MakeFree(slot);
+    quarantine_.clear();
+  }
+
+  bool IsLive(Slot slot) const { return live_.Test(slot); }
+  /// Revision at which the present or last occupant was born; 0: the slot was never used.
+  Stamp Born(Slot slot) const { return slot < limit_ ? born_[slot] : 0; }
+  const BitSet& live() const { return live_; }
+  uint32_t num_live() const { return live_.size(); }
+  /// One past the highest slot that was ever used.
+  Slot limit() const { return limit_; }
+  void Reserve(size_t slots) { born_.reserve(slots); }
+  size_t memory_bytes() const {
+    return live_.memory_bytes() + free_.memory_bytes() + quarantine_.size() * sizeof(Slot) +
+           born_.size() * sizeof(Stamp);
+  }
+
+ private:
+  void MakeFree(Slot slot) {
+    free_.Set(slot);
+    if (slot < first_free_hint_) first_free_hint_ = slot;
+  }
+
+  BitSet live_;
+  BitSet free_;
+  std::vector<Slot> quarantine_;
+  std::vector<Stamp> born_;
+  Slot limit_ = 0;
+  Slot first_free_hint_ = 0;  ///< no free slot lies below
+};
+
+}  // namespace dynmesh
+
+#endif  // DYNMESH_CORE_MESH_SLOTS_H_

@@ -1,0 +1,319 @@
+#include "core/mesh/validate.h"
+
+#include <algorithm>
+#include <map>
+
+#include "absl/container/flat_hash_map.h"
+#include "absl/strings/str_cat.h"
+
+namespace dynmesh {
+namespace {
+
+/// A face's vertex cycle in a form that is the same for every rotation and direction.
+using CycleKey = std::array<VertexId, kMaxFaceVertices>;
+
+CycleKey KeyOf(absl::Span<const VertexId> vertices) {
+  const int n = vertices.size();
+  CycleKey best{};
+  for (int value = 0; value < 8; ++value) {
+    const FaceCode code{static_cast<uint8_t>(value)};
+    if (code.rotation() >= n) continue;
+    CycleKey key{};
+    for (int k = 0; k < n; ++k) key[k] = vertices[code.StoredVertex(k, n)];
+    if (value == 0 || key < best) best = key;
+  }
+  return best;
+}
+
+}  // namespace
+
+/// Collects violations; one method for each group of invariants.
+class MeshValidator {
+ public:
+  MeshValidator(const Mesh& mesh, size_t max_violations) : mesh_(mesh), max_violations_(max_violations) {}
+
+  std::vector<std::string> Run() {
+    CheckEdges();
+    CheckFaces();
+    CheckCells();
+    if (!violations_.empty()) return std::move(violations_);  // the rest follows references
+    CheckUpwardLists();
+    CheckHubEdges();
+    CheckPrimaries<EdgeId>(EntityKind::kEdge, [this](EdgeId e) { return PairKey(e); });
+    CheckPrimaries<FaceId>(EntityKind::kFace, [this](FaceId f) { return KeyOf(mesh_.Vertices(f)); });
+    CheckBoundary();
+    CheckCountsAndStamps();
+    CheckChecksum();
+    return std::move(violations_);
+  }
+
+ private:
+  template <typename... Args>
+  void Report(const Args&... args) {
+    if (violations_.size() < max_violations_) violations_.push_back(absl::StrCat(args...));
+  }
+
+  template <typename UpperId, typename Fn>
+  void ForEachLive(EntityKind kind, Fn fn) const {
+    mesh_.slots(kind).live().ForEach([&](Slot slot) { fn(UpperId(slot)); });
+  }
+
+  std::array<VertexId, 2> PairKey(EdgeId e) const {
+    const auto ends = mesh_.Vertices(e);
+    return {std::min(ends[0], ends[1]), std::max(ends[0], ends[1])};
+  }
+
+  // ---- Downward references ----
+
+  void CheckLiveVertices(EntityId id) {
+    for (VertexId v : mesh_.VerticesOf(id)) {
+      if (!mesh_.IsLive(v)) Report(EntityKindName(id.kind), " ", id.slot, " has dead vertex ", v.slot());
+    }
+  }
+
+  void CheckEdges() {
+    ForEachLive<EdgeId>(EntityKind::kEdge, [&](EdgeId e) {
+      CheckLiveVertices(e);
+      if (mesh_.Type(e) != ElementType::kWireEdge) Report("edge ", e.slot(), " has another type");
+      if (!mesh_.IsElement(e) && mesh_.IncidentFaces(e).empty()) Report("edge ", e.slot(), " is unused");
+    });
+  }
+
+  void CheckFaces() {
+    ForEachLive<FaceId>(EntityKind::kFace, [&](FaceId f) {
+      CheckLiveVertices(f);
+      if (!mesh_.IsElement(f) && mesh_.IncidentCells(f).empty()) Report("face ", f.slot(), " is unused");
+      const auto vertices = mesh_.Vertices(f);
+      const auto edges = mesh_.Edges(f);
+      for (size_t k = 0; k < edges.size(); ++k) {
+        CheckJoins(f, edges[k], vertices[k], vertices[(k + 1) % vertices.size()]);
+      }
+    });
+  }
+
+  void CheckJoins(EntityId user, EdgeId e, VertexId a, VertexId b) {
+    if (!mesh_.IsLive(e)) return Report(EntityKindName(user.kind), " ", user.slot, " has dead edge ", e.slot());
+    if (PairKey(e) != std::array<VertexId, 2>{std::min(a, b), std::max(a, b)}) {
+      Report("edge ", e.slot(), " of ", EntityKindName(user.kind), " ", user.slot, " does not join ", a.slot(),
+             " and ", b.slot());
+    }
+    if (mesh_.IsDuplicate(e)) Report(EntityKindName(user.kind), " ", user.slot, " uses duplicate edge ", e.slot());
+  }
+
+  void CheckCells() {
+    ForEachLive<CellId>(EntityKind::kCell, [&](CellId c) {
+      CheckLiveVertices(c);
+      if (!mesh_.IsElement(c) || mesh_.IsDuplicate(c)) Report("cell ", c.slot(), " has wrong flags");
+      bool sound = true;
+      for (int i = 0; i < TemplateOf(mesh_.Type(c)).num_faces; ++i) sound = CheckCellFace(c, i) && sound;
+      if (sound) CheckCellEdges(c);
+    });
+  }
+
+  bool CheckCellFace(CellId c, int local_face) {
+    const LocalFace& face = TemplateOf(mesh_.Type(c)).faces[local_face];
+    const OrientedFace oriented = mesh_.Faces(c)[local_face];
+    const FaceId f = oriented.face();
+    if (!mesh_.IsLive(f) || mesh_.Vertices(f).size() != face.size) {
+      Report("cell ", c.slot(), " has dead or misfit face ", f.slot());
+      return false;
+    }
+    if (mesh_.IsDuplicate(f)) Report("cell ", c.slot(), " uses duplicate face ", f.slot());
+    for (int k = 0; k < face.size; ++k) {
+      const VertexId stored = mesh_.Vertices(f)[oriented.code().StoredVertex(k, face.size)];
+      if (stored == mesh_.Vertices(c)[face.vertices[k]]) continue;
+      Report("cell ", c.slot(), " has a wrong orientation code for face ", f.slot());
+      return false;
+    }
+    return true;
+  }
+
+  void CheckCellEdges(CellId c) {
+    const ElementTemplate& shape = TemplateOf(mesh_.Type(c));
+    for (int e = 0; e < shape.num_edges; ++e) {
+      CheckJoins(c, mesh_.Edge(c, e), mesh_.Vertices(c)[shape.edges[e].vertices[0]],
+                 mesh_.Vertices(c)[shape.edges[e].vertices[1]]);
+    }
+    for (int i = 0; i < shape.num_faces; ++i) {
+      const OrientedFace oriented = mesh_.Faces(c)[i];
+      const auto edges = mesh_.Edges(oriented.face());
+      for (int k = 0; k < shape.faces[i].size; ++k) {
+        if (edges[oriented.code().StoredEdge(k, edges.size())] == mesh_.Edge(c, shape.faces[i].edges[k])) continue;
+        Report("cell ", c.slot(), " sees different edges through face ", oriented.face().slot());
+      }
+    }
+  }
+
+  // ---- Upward lists: exactly the inverse of the downward references ----
+
+  void CheckUpwardLists() {
+    using Uses = std::map<std::pair<Slot, Slot>, int>;
+    Uses edges, faces, cells;
+    ForEachLive<EdgeId>(EntityKind::kEdge, [&](EdgeId e) {
+      for (VertexId v : mesh_.Vertices(e)) ++edges[{v.slot(), e.slot()}];
+    });
+    ForEachLive<FaceId>(EntityKind::kFace, [&](FaceId f) {
+      for (EdgeId e : mesh_.Edges(f)) ++faces[{e.slot(), f.slot()}];
+    });
+    ForEachLive<CellId>(EntityKind::kCell, [&](CellId c) {
+      for (OrientedFace oriented : mesh_.Faces(c)) ++cells[{oriented.face().slot(), c.slot()}];
+    });
+    Compare<VertexId>(EntityKind::kVertex, edges, [&](VertexId v) { return mesh_.IncidentEdges(v); });
+    Compare<EdgeId>(EntityKind::kEdge, faces, [&](EdgeId e) { return mesh_.IncidentFaces(e); });
+    Compare<FaceId>(EntityKind::kFace, cells, [&](FaceId f) { return mesh_.IncidentCells(f); });
+  }
+
+  template <typename LowerId, typename Uses, typename ListOf>
+  void Compare(EntityKind kind, Uses& uses, ListOf list_of) {
+    ForEachLive<LowerId>(kind, [&](LowerId lower) {
+      for (auto upper : list_of(lower)) --uses[{lower.slot(), upper.slot()}];
+    });
+    for (const auto& [pair, difference] : uses) {
+      if (difference == 0) continue;
+      Report(EntityKindName(kind), " ", pair.first, " lists its user ", pair.second, " ",
+             difference > 0 ? "too rarely" : "too often");
+    }
+  }
+
+  void CheckHubEdges() {
+    size_t expected = 0;
+    ForEachLive<EdgeId>(EntityKind::kEdge, [&](EdgeId e) {
+      const auto [a, b] = PairKey(e);
+      const bool hubs = mesh_.IncidentEdges(a).size() > Mesh::kHubDegree &&
+                        mesh_.IncidentEdges(b).size() > Mesh::kHubDegree;
+      if (!hubs || mesh_.IsDuplicate(e)) return;
+      ++expected;
+      const auto it = mesh_.hub_edges_.find({a, b});
+      if (it == mesh_.hub_edges_.end() || it->second != e) Report("hub edge ", e.slot(), " is not indexed");
+    });
+    if (mesh_.hub_edges_.size() < expected) Report("the hub index is too small");
+    for (const auto& [pair, e] : mesh_.hub_edges_) {
+      const std::array<VertexId, 2> ends = {pair.first, pair.second};
+      if (!mesh_.IsLive(e) || PairKey(e) != ends) Report("hub index holds wrong edge ", e.slot());
+    }
+  }
+
+  // ---- Duplicates ----
+
+  template <typename EntityIdType, typename KeyFn>
+  void CheckPrimaries(EntityKind kind, KeyFn key_of) {
+    struct Group {
+      int primaries = 0;
+      bool primary_is_element = false;
+      bool has_duplicates = false;
+    };
+    std::map<decltype(key_of(EntityIdType())), Group> groups;
+    uint32_t duplicates = 0;
+    ForEachLive<EntityIdType>(kind, [&](EntityIdType id) {
+      Group& group = groups[key_of(id)];
+      group.has_duplicates |= mesh_.IsDuplicate(id);
+      duplicates += mesh_.IsDuplicate(id);
+      if (mesh_.IsDuplicate(id) && !mesh_.IsElement(id)) Report("derived duplicate ", EntityKindName(kind), " ", id.slot());
+      if (mesh_.IsDuplicate(id)) return;
+      ++group.primaries;
+      group.primary_is_element |= mesh_.IsElement(id);
+      if (group.primaries > 1) Report("two primaries, one is ", EntityKindName(kind), " ", id.slot());
+    });
+    for (const auto& [key, group] : groups) {
+      if (group.primaries == 0) Report("a duplicate ", EntityKindName(kind), " without primary");
+      if (group.has_duplicates && !group.primary_is_element) {
+        Report("a derived ", EntityKindName(kind), " with duplicates is primary");
+      }
+    }
+    if (duplicates != mesh_.num_duplicates_[Dimension(kind)]) Report("wrong count of duplicates");
+  }
+
+  // ---- Boundary ----
+
+  void CheckBoundary() {
+    std::vector<uint32_t> of_vertices(mesh_.slots(EntityKind::kVertex).limit());
+    std::vector<uint32_t> of_edges(mesh_.slots(EntityKind::kEdge).limit());
+    ForEachLive<FaceId>(EntityKind::kFace, [&](FaceId f) {
+      const bool expected = mesh_.IncidentCells(f).size() == 1;
+      if (mesh_.IsOnBoundary(f) != expected) Report("face ", f.slot(), " has a wrong boundary bit");
+      if (!expected) return;
+      for (EdgeId e : mesh_.Edges(f)) ++of_edges[e.slot()];
+      for (VertexId v : mesh_.Vertices(f)) ++of_vertices[v.slot()];
+    });
+    ForEachLive<EdgeId>(EntityKind::kEdge, [&](EdgeId e) {
+      if (mesh_.IncidentFaces(e).size() != 1) return;
+      ++of_edges[e.slot()];
+      for (VertexId v : mesh_.Vertices(e)) ++of_vertices[v.slot()];
+    });
+    CheckBoundaryUses(EntityKind::kVertex, of_vertices);
+    CheckBoundaryUses(EntityKind::kEdge, of_edges);
+    if (!mesh_.Boundary(EntityKind::kCell).empty()) Report("cells on the boundary");
+    CheckNoDeadBits();
+  }
+
+  void CheckBoundaryUses(EntityKind kind, const std::vector<uint32_t>& expected) {
+    for (Slot slot = 0; slot < expected.size(); ++slot) {
+      if (mesh_.boundary_uses_[Dimension(kind)][slot] != expected[slot]) {
+        Report(EntityKindName(kind), " ", slot, " has a wrong boundary counter");
+      }
+      if (mesh_.IsOnBoundary({kind, slot}) != (expected[slot] > 0)) {
+        Report(EntityKindName(kind), " ", slot, " has a wrong boundary bit");
+      }
+    }
+  }
+
+  void CheckNoDeadBits() {
+    for (EntityKind kind : kEntityKinds) {
+      mesh_.Boundary(kind).ForEach([&](Slot slot) {
+        if (!mesh_.IsLive({kind, slot})) Report("dead ", EntityKindName(kind), " ", slot, " on the boundary");
+      });
+    }
+  }
+
+  // ---- Counts, stamps, checksums ----
+
+  void CheckCountsAndStamps() {
+    for (EntityKind kind : kEntityKinds) {
+      uint32_t elements = 0;
+      uint32_t live = 0;
+      mesh_.slots(kind).live().ForEach([&](Slot slot) {
+        ++live;
+        elements += mesh_.IsElement({kind, slot});
+        CheckStamps({kind, slot});
+      });
+      if (live != mesh_.NumLive(kind)) Report("wrong count of live entities, kind ", EntityKindName(kind));
+      if (elements != mesh_.NumElements(kind)) Report("wrong count of elements, kind ", EntityKindName(kind));
+    }
+  }
+
+  void CheckStamps(EntityId id) {
+    const int64_t born = mesh_.slots(id.kind).Born(id.slot);
+    const int64_t changed = mesh_.changed(id.kind).At(id.slot);
+    const bool has_changed = id.kind == EntityKind::kVertex || mesh_.IsElement(id);
+    if (born < 1 || born > mesh_.revision() + 1 || (has_changed && changed < born) ||
+        changed > mesh_.revision() + 1) {
+      Report(EntityKindName(id.kind), " ", id.slot, " has impossible stamps: born ", born, ", changed ", changed);
+    }
+  }
+
+  void CheckChecksum() {
+    Checksum expected;
+    ForEachLive<VertexId>(EntityKind::kVertex, [&](VertexId v) {
+      expected.topology += Checksum::VertexTerm(v.slot());
+      expected.geometry += Checksum::PositionTerm(v.slot(), mesh_.Position(v));
+    });
+    for (EntityKind kind : {EntityKind::kEdge, EntityKind::kFace, EntityKind::kCell}) {
+      mesh_.slots(kind).live().ForEach([&](Slot slot) {
+        const EntityId id(kind, slot);
+        if (mesh_.IsElement(id)) expected.topology += Checksum::ElementTerm(mesh_.Type(id), slot, mesh_.VerticesOf(id));
+      });
+    }
+    if (expected.topology != mesh_.checksum().topology) Report("wrong topology checksum");
+    if (expected.geometry != mesh_.checksum().geometry) Report("wrong geometry checksum");
+  }
+
+  const Mesh& mesh_;
+  const size_t max_violations_;
+  std::vector<std::string> violations_;
+};
+
+std::vector<std::string> Validate(const Mesh& mesh, size_t max_violations) {
+  return MeshValidator(mesh, max_violations).Run();
+}
+
+}  // namespace dynmesh

@@ -1,0 +1,122 @@
+#include "core/edit/transaction.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/mesh/validate.h"
+#include "tests/support/meshes.h"
+#include "tests/support/oracle.h"
+
+namespace dynmesh::testing {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+
+std::string Metadata(const absl::Status& status, absl::string_view key) {
+  const auto detail = GetErrorDetail(status);
+  return detail ? std::string(detail->Find(key)) : "";
+}
+
+TEST(TransactionTest, ABatchIsOneRevisionAndMayUseItsOwnVertices) {
+  Mesh mesh = OneTet();
+  const std::vector<Edit> edits = {AddVerticesEdit{{{1, 1, 1}, {2, 2, 2}}},
+                                   AddElementsEdit{ElementType::kTetrahedron, {0, 1, 2, kNewVertex | 1}},
+                                   MoveVerticesEdit{{kNewVertex | 0}, {{5, 5, 5}}}};
+  const auto result = ApplyBatch(mesh, edits, {});
+  ASSERT_TRUE(result.ok()) << result.status();
+  EXPECT_EQ(result->revision, 2);
+  EXPECT_EQ(mesh.revision(), 2);
+  ASSERT_EQ(result->results.size(), 3u);
+  EXPECT_THAT(result->results[0].new_slots, ElementsAre(4, 5));
+  EXPECT_THAT(result->results[1].new_slots, ElementsAre(1));
+  EXPECT_THAT(mesh.Vertices(CellId(1)), ElementsAre(VertexId(0), VertexId(1), VertexId(2), VertexId(5)));
+  EXPECT_EQ(mesh.Position(VertexId(4))[0], 5);
+  EXPECT_EQ(result->checksum, mesh.checksum());
+  EXPECT_THAT(result->counts, ElementsAre(6, 9, 7, 2));
+}
+
+TEST(TransactionTest, ARefusedBatchChangesNothingAndSaysWhere) {
+  Mesh mesh = TetWithDanglers();
+  const std::string before = Describe(mesh);
+  const Edit good = AddVerticesEdit{{{1, 1, 1}}};
+  const Edit remove = RemoveElementsEdit{EntityKind::kCell, {0}};
+  const struct {
+    Edit bad;
+    const char* reason;
+    const char* index;
+  } cases[] = {
+      {AddElementsEdit{ElementType::kTriangle, {0, 1, 2, 0, 1, 44}}, reason::kUnknownEntity, "1"},
+      {AddElementsEdit{ElementType::kTriangle, {0, 1, 2, 0}}, reason::kBadArrayLength, ""},
+      {AddElementsEdit{ElementType::kUnspecified, {0, 1, 2, 0}}, reason::kBadElementType, ""},
+      {AddElementsEdit{ElementType::kTriangle, {0, 1, kNewVertex | 1}}, reason::kUnknownEntity, "0"},
+      {RemoveElementsEdit{EntityKind::kCell, {0}}, reason::kEntityRemoved, "0"},
+      {RemoveElementsEdit{EntityKind::kVertex, {0}}, reason::kBadEntityKind, "0"},
+      {RemoveVerticesEdit{{6, 6}}, reason::kEntityRemoved, "1"},
+      {MoveVerticesEdit{{0, 1}, {{0, 0, 0}}}, reason::kBadArrayLength, ""},
+      {SetAttributeEdit{{"x", EntityKind::kCell, AttributeType::kInt32, 1}, {0}, {0, 0, 0, 0}},
+       reason::kUnknownAttribute, ""},
+      {AddAttributeEdit{{"", EntityKind::kCell, AttributeType::kInt32, 1}}, reason::kBadArgument, ""},
+  };
+  for (const auto& c : cases) {
+    const auto result = ApplyBatch(mesh, std::vector<Edit>{good, remove, c.bad}, {});
+    EXPECT_EQ(ErrorReason(result.status()), c.reason) << result.status();
+    EXPECT_EQ(Metadata(result.status(), "edit"), "2");
+    EXPECT_EQ(Metadata(result.status(), "index"), c.index);
+    EXPECT_EQ(Describe(mesh), before);
+  }
+  EXPECT_THAT(Validate(mesh), IsEmpty());
+}
+
+TEST(TransactionTest, ADryRunTellsAndChangesNothing) {
+  Mesh mesh = OneTet();
+  const std::string before = Describe(mesh);
+  const std::vector<Edit> edits = {AddVerticesEdit{{{1, 1, 1}}}, RemoveElementsEdit{EntityKind::kCell, {0}}};
+  BatchOptions options;
+  options.dry_run = true;
+  const auto dry = ApplyBatch(mesh, edits, options);
+  ASSERT_TRUE(dry.ok());
+  EXPECT_EQ(Describe(mesh), before);
+  EXPECT_EQ(dry->revision, 1);
+  const auto wet = ApplyBatch(mesh, edits, {});
+  ASSERT_TRUE(wet.ok());
+  EXPECT_EQ(dry->checksum, wet->checksum);
+  EXPECT_EQ(dry->results[0].new_slots, wet->results[0].new_slots);
+}
+
+TEST(TransactionTest, IdsReadBeforeARebirthAreRefused) {
+  Mesh mesh = OneTet();
+  ASSERT_TRUE(ApplyBatch(mesh, std::vector<Edit>{RemoveElementsEdit{EntityKind::kCell, {0}}}, {}).ok());
+  ASSERT_TRUE(
+      ApplyBatch(mesh, std::vector<Edit>{AddElementsEdit{ElementType::kTetrahedron, {0, 1, 2, 3}}}, {}).ok());
+  BatchOptions stale;
+  stale.as_of_revision = 1;
+  const std::vector<Edit> remove = {RemoveElementsEdit{EntityKind::kCell, {0}}};
+  const auto refused = ApplyBatch(mesh, remove, stale);
+  EXPECT_EQ(refused.status().code(), absl::StatusCode::kNotFound);
+  EXPECT_EQ(ErrorReason(refused.status()), reason::kEntityRemoved);
+  EXPECT_TRUE(ApplyBatch(mesh, remove, {}).ok());
+}
+
+TEST(TransactionTest, AnEmptyBatchIsNoRevision) {
+  Mesh mesh = OneTet();
+  const auto result = ApplyBatch(mesh, {}, {});
+  ASSERT_TRUE(result.ok());
+  EXPECT_EQ(result->revision, 1);
+}
+
+TEST(TransactionTest, DegenerateAndDuplicateElementsAreReported) {
+  Mesh mesh = OneTet();
+  const auto result = ApplyBatch(mesh,
+                                 std::vector<Edit>{AddElementsEdit{ElementType::kTetrahedron, {0, 1, 2, 2, 3, 2, 1, 0}},
+                                                   AddElementsEdit{ElementType::kTriangle, {0, 1, 2, 2, 1, 0}}},
+                                 {});
+  ASSERT_TRUE(result.ok());
+  EXPECT_THAT(result->degenerate, ElementsAre(EntityId(CellId(1))));
+  ASSERT_EQ(result->duplicate.size(), 2u);
+  EXPECT_EQ(result->duplicate[0], EntityId(CellId(2)));
+  EXPECT_EQ(result->duplicate[1].kind, EntityKind::kFace);
+}
+
+}  // namespace
+}  // namespace dynmesh::testing

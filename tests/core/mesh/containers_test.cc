@@ -1,0 +1,160 @@
+// The building blocks of a mesh against the standard containers.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <map>
+#include <random>
+#include <set>
+#include <vector>
+
+#include "core/mesh/bit_set.h"
+#include "core/mesh/incidence_lists.h"
+#include "core/mesh/slots.h"
+#include "core/mesh/stamps.h"
+
+namespace dynmesh {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+
+TEST(BitSetTest, BehavesLikeASortedSet) {
+  std::mt19937 rng(1);
+  BitSet bits;
+  std::set<Slot> model;
+  for (int i = 0; i < 20000; ++i) {
+    const Slot slot = rng() % 300 * (rng() % 3 == 0 ? 997 : 1);
+    const bool member = rng() % 2;
+    bits.Assign(slot, member);
+    member ? (void)model.insert(slot) : (void)model.erase(slot);
+    const Slot from = rng() % 300000;
+    const auto next = model.lower_bound(from);
+    ASSERT_EQ(bits.Next(from), next == model.end() ? kNoSlot : *next);
+    ASSERT_EQ(bits.Test(slot), member);
+    ASSERT_EQ(bits.size(), model.size());
+  }
+  std::vector<Slot> listed;
+  bits.ForEach([&](Slot slot) { listed.push_back(slot); });
+  EXPECT_EQ(listed, std::vector<Slot>(model.begin(), model.end()));
+}
+
+TEST(SlotsTest, LowestFreeSlotIsReusedOnlyAfterQuarantine) {
+  Slots slots;
+  for (Slot expected = 0; expected < 4; ++expected) EXPECT_EQ(slots.Allocate(1).slot, expected);
+  slots.Free(2);
+  slots.Free(1);
+  EXPECT_EQ(slots.Allocate(2).slot, 4u);
+  slots.EndQuarantine();
+  const Slots::Allocation reused = slots.Allocate(3);
+  EXPECT_EQ(reused.slot, 1u);
+  EXPECT_EQ(reused.born_before, 1u);
+  EXPECT_EQ(slots.Allocate(3).slot, 2u);
+  EXPECT_EQ(slots.Allocate(3).slot, 5u);
+  EXPECT_EQ(slots.Born(1), 3u);
+  EXPECT_EQ(slots.Born(77), 0u);
+}
+
+TEST(SlotsTest, UndoInReverseOrderRestoresTheLimitAndFreeSlots) {
+  Slots slots;
+  for (int i = 0; i < 3; ++i) slots.Allocate(1);
+  slots.Free(0);
+  slots.EndQuarantine();
+  const auto reused = slots.Allocate(2);
+  const auto appended = slots.Allocate(2);
+  slots.Free(2);
+  slots.UndoFree(2);
+  slots.UndoAllocate(appended.slot, appended.born_before);
+  slots.UndoAllocate(reused.slot, reused.born_before);
+  EXPECT_EQ(slots.limit(), 3u);
+  EXPECT_EQ(slots.num_live(), 2u);
+  EXPECT_FALSE(slots.IsLive(0));
+  EXPECT_EQ(slots.Born(0), 1u);
+  EXPECT_EQ(slots.Allocate(5).slot, 0u);
+}
+
+TEST(SlotsTest, RoomCountsFreeSlotsAndTheLimit) {
+  Slots slots;
+  for (int i = 0; i < 3; ++i) slots.Allocate(1);
+  EXPECT_TRUE(slots.CanAllocate(2, 5));
+  EXPECT_FALSE(slots.CanAllocate(3, 5));
+  slots.Free(1);
+  EXPECT_FALSE(slots.CanAllocate(3, 5)) << "a quarantined slot is no room";
+  slots.EndQuarantine();
+  EXPECT_TRUE(slots.CanAllocate(3, 5));
+}
+
+TEST(StampColumnTest, ForEachSinceFindsWhatABruteForceScanFinds) {
+  std::mt19937 rng(2);
+  StampColumn column;
+  std::map<Slot, Stamp> model;
+  for (Stamp stamp = 1; stamp < 400; ++stamp) {
+    const Slot slot = rng() % 5000;
+    column.Touch(slot, stamp);
+    model[slot] = stamp;
+    const Stamp since = rng() % (stamp + 1);
+    const Slot begin = rng() % 5000;
+    const Slot end = begin + rng() % 3000;
+    std::vector<Slot> expected, actual;
+    for (const auto& [s, value] : model) {
+      if (value > since && s >= begin && s < end) expected.push_back(s);
+    }
+    column.ForEachSince(since, begin, end, [&](Slot s) { actual.push_back(s); });
+    ASSERT_EQ(actual, expected);
+    ASSERT_GE(column.BoundSince(since), actual.size());
+  }
+}
+
+class IncidenceListsTest : public ::testing::Test {
+ protected:
+  std::vector<Slot> Sorted(Slot lower) const {
+    std::vector<Slot> entries;
+    for (EdgeId e : lists_.Of(lower)) entries.push_back(e.slot());
+    std::sort(entries.begin(), entries.end());
+    return entries;
+  }
+  IncidenceLists<EdgeId> lists_;
+};
+
+TEST_F(IncidenceListsTest, BehavesLikeMultisets) {
+  std::mt19937 rng(3);
+  std::map<Slot, std::multiset<Slot>> model;
+  for (int i = 0; i < 60000; ++i) {
+    const Slot lower = rng() % 7;
+    auto& expected = model[lower];
+    const bool add = expected.empty() || rng() % 1000 < (i / 10000 % 2 == 0 ? 700u : 250u);
+    if (add) {
+      const Slot upper = rng() % 3 == 0 ? rng() % 5 : rng() % 100000;
+      lists_.Add(lower, EdgeId(upper));
+      expected.insert(upper);
+    } else {
+      const auto it = std::next(expected.begin(), rng() % std::min<size_t>(expected.size(), 50));
+      lists_.Remove(lower, EdgeId(*it));
+      expected.erase(it);
+    }
+    ASSERT_EQ(lists_.Length(lower), expected.size());
+    if (i % 97 == 0) {
+      ASSERT_EQ(Sorted(lower), std::vector<Slot>(expected.begin(), expected.end()));
+    }
+  }
+}
+
+TEST_F(IncidenceListsTest, EmptiedListsGiveTheirRoomToOthers) {
+  for (Slot upper = 0; upper < 10000; ++upper) lists_.Add(0, EdgeId(upper));
+  const size_t bytes = lists_.memory_bytes();
+  for (Slot upper = 0; upper < 10000; ++upper) lists_.Remove(0, EdgeId(upper));
+  EXPECT_THAT(lists_.Of(0), IsEmpty());
+  for (Slot upper = 0; upper < 10000; ++upper) lists_.Add(1, EdgeId(upper));
+  EXPECT_LE(lists_.memory_bytes(), bytes + 4096);
+}
+
+TEST_F(IncidenceListsTest, OneEntryTwiceIsRemovedOnceAtATime) {
+  lists_.Add(3, EdgeId(9));
+  lists_.Add(3, EdgeId(9));
+  lists_.Remove(3, EdgeId(9));
+  EXPECT_THAT(lists_.Of(3), ElementsAre(EdgeId(9)));
+  EXPECT_THAT(lists_.Of(99), IsEmpty());
+}
+
+}  // namespace
+}  // namespace dynmesh
