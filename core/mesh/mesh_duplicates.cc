@@ -24,24 +24,26 @@ void Mesh::PassOnPrimary(EntityId id) {
   }
 }
 
+// Both search from the end, where later uses stand: a pile of equal elements is cleared in linear time.
+
 EdgeId Mesh::FindDuplicateOf(EdgeId e) const {
   auto [a, b] = edge_vertices_[e.slot()];
   if (vertex_edges_.Length(b.slot()) < vertex_edges_.Length(a.slot())) std::swap(a, b);
-  EdgeId heir;
-  for (EdgeId other : IncidentEdges(a)) {
+  const auto candidates = IncidentEdges(a);
+  const auto heir = std::find_if(candidates.rbegin(), candidates.rend(), [&, a = a, b = b](EdgeId other) {
     const auto& ends = edge_vertices_[other.slot()];
     const bool joins = (ends[0] == a && ends[1] == b) || (ends[0] == b && ends[1] == a);
-    if (joins && IsDuplicate(other)) heir = std::min(heir, other);
-  }
-  return heir;
+    return joins && IsDuplicate(other);
+  });
+  return heir == candidates.rend() ? EdgeId() : *heir;
 }
 
 FaceId Mesh::FindDuplicateOf(FaceId f) const {
-  FaceId heir;
-  for (FaceId other : IncidentFaces(LeastUsed(Edges(f)))) {
-    if (IsDuplicate(other) && MatchFace(Vertices(other), Vertices(f))) heir = std::min(heir, other);
-  }
-  return heir;
+  const auto candidates = IncidentFaces(LeastUsed(Edges(f)));
+  const auto heir = std::find_if(candidates.rbegin(), candidates.rend(), [&](FaceId other) {
+    return IsDuplicate(other) && MatchFace(Vertices(other), Vertices(f));
+  });
+  return heir == candidates.rend() ? FaceId() : *heir;
 }
 
 void Mesh::MoveUsesTo(EdgeId from, EdgeId to) {

@@ -98,6 +98,14 @@ TEST(TransactionTest, IdsReadBeforeARebirthAreRefused) {
   EXPECT_TRUE(ApplyBatch(mesh, remove, {}).ok());
 }
 
+TEST(TransactionTest, AnIdMadeInTheBatchCannotBeGuessed) {
+  Mesh mesh = OneTet();
+  const std::vector<Edit> edits = {AddElementsEdit{ElementType::kTetrahedron, {0, 1, 2, 3}},
+                                   RemoveElementsEdit{EntityKind::kCell, {1}}};
+  EXPECT_EQ(ErrorReason(ApplyBatch(mesh, edits, {}).status()), reason::kEntityRemoved);
+  EXPECT_EQ(mesh.NumLive(EntityKind::kCell), 1u);
+}
+
 TEST(TransactionTest, AnEmptyBatchIsNoRevision) {
   Mesh mesh = OneTet();
   const auto result = ApplyBatch(mesh, {}, {});

@@ -284,6 +284,22 @@ TEST(MeshTest, HubsOfThousandsOfEdgesStaySound) {
   EXPECT_THAT(Validate(mesh), IsEmpty());
 }
 
+TEST(MeshTest, AnEdgeBetweenTwoOldHubsIsFound) {
+  constexpr Slot kRim = 600;
+  Mesh mesh;
+  AddVertices(mesh, 2 * kRim + 2);
+  for (Slot i = 0; i < kRim; ++i) {
+    Add(mesh, ElementType::kWireEdge, {0, 2 + i});
+    Add(mesh, ElementType::kWireEdge, {1, 2 + kRim + i});
+  }
+  EXPECT_FALSE(mesh.FindEdge(VertexId(0), VertexId(1)).valid());
+  const EntityId bridge = Add(mesh, ElementType::kWireEdge, {0, 1});
+  EXPECT_EQ(mesh.FindEdge(VertexId(1), VertexId(0)), EdgeId(bridge.slot));
+  EXPECT_THAT(Validate(mesh), IsEmpty());
+  ASSERT_TRUE(mesh.RemoveElement(bridge).ok());
+  EXPECT_FALSE(mesh.FindEdge(VertexId(0), VertexId(1)).valid());
+}
+
 TEST(MeshTest, AttributesOfANewOccupantAreZero) {
   Mesh mesh = OneTet();
   const AttributeSpec spec = {"temperature", C, AttributeType::kFloat64, 1};
