@@ -33,8 +33,9 @@ absl::StatusOr<AttributeSpec> UnpackSpec(const Section& section) {
   spec.type = in.Fixed<AttributeType>();
   spec.components = in.Fixed<uint8_t>();
   spec.name = std::string(in.Bytes(in.remaining()));
-  if (!in.ok() || !CheckAttributeSpec(spec).ok())
+  if (!in.ok() || !CheckAttributeSpec(spec).ok()) {
     return CorruptPayload("an attribute's description is not valid");
+  }
   return spec;
 }
 

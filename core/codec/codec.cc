@@ -38,8 +38,9 @@ absl::Status CheckGrid(const QuantizationGrid& grid) {
   if (grid.step == 0) return absl::OkStatus();
   bool valid = std::isfinite(grid.step) && grid.step > 0 && grid.bits >= 1 && grid.bits <= kMaxGridBits;
   const double extent = valid ? grid.step * ((1u << grid.bits) - 1) : 0;
-  for (double coordinate : grid.origin)
+  for (double coordinate : grid.origin) {
     valid &= std::isfinite(coordinate) && std::isfinite(coordinate + extent);
+  }
   return valid ? absl::OkStatus()
                : InvalidArgument(reason::kBadArgument, "the quantisation grid is not valid");
 }

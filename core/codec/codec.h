@@ -36,18 +36,20 @@ struct EncodeOptions {
   QuantizationGrid grid;  ///< step 0: positions are lossless float64
 };
 
-/// Sizes in bytes of what went into a message, for statistics.
+/// Sizes in bytes of what went into a message, for statistics. Topology is elements and removals, geometry
+/// the slots and positions of upserted vertices; header, seal and padding are none of these.
 struct EncodeStats {
   uint64_t raw_topology_bytes = 0;   ///< as fixed-width arrays (4 B a slot, 4 B a corner, 1 B a type)
-  uint64_t raw_geometry_bytes = 0;
-  uint64_t topology_bytes = 0;       ///< as encoded
+  uint64_t raw_geometry_bytes = 0;   ///< as fixed-width arrays (4 B a slot, 24 B a position)
+  uint64_t topology_bytes = 0;       ///< as encoded, with their entries in the section table
   uint64_t geometry_bytes = 0;
   uint64_t attribute_bytes = 0;
 };
 
 /// `delta` as bytes. Falls back from Draco to zstd where Draco cannot (n = 0, exceptions), so encoding a
 /// valid delta never fails but for memory.
-/// REQUIRES: CheckDelta(delta).ok(). Errors: RESOURCE_EXHAUSTED when memory ran out.
+/// REQUIRES: CheckDelta(delta).ok(). Errors: INVALID_ARGUMENT for a grid that is not valid,
+/// RESOURCE_EXHAUSTED when memory ran out.
 absl::StatusOr<std::string> EncodeDelta(const Delta& delta, const EncodeOptions& options,
                                         EncodeStats* stats = nullptr);
 
@@ -58,7 +60,8 @@ struct DecodeLimits {
 
 /// What a message says, after every check that does not need the receiver's copy.
 ///
-/// Allocation is bounded by a small multiple of bytes.size(), whatever the bytes claim.
+/// Memory is bounded by a fixed multiple of bytes.size(), whatever the bytes claim (FORMAT.md, "Weight");
+/// messages of meshes take some ten times their size.
 /// Errors: DATA_LOSS CORRUPT_PAYLOAD (damaged or hostile bytes), UNIMPLEMENTED UNSUPPORTED_FORMAT (newer
 /// version), RESOURCE_EXHAUSTED (beyond `limits`).
 absl::StatusOr<Delta> DecodeDelta(absl::string_view bytes, const DecodeLimits& limits = {});

@@ -4,7 +4,6 @@
 #include <draco/compression/expert_encode.h>
 #include <draco/point_cloud/point_cloud.h>
 
-#include <memory>
 #include <new>
 
 #include "core/codec/bytes.h"
@@ -62,22 +61,30 @@ absl::StatusOr<std::string> EncodeCloud(absl::Span<const uint32_t> symbols) {
   return std::string(buffer.data(), buffer.size());
 }
 
+// The header was checked, but what Draco made of the rest was not.
+bool HoldsSymbols(const draco::PointCloud& cloud, size_t count) {
+  if (cloud.num_attributes() != 1 || cloud.num_points() != count) return false;
+  const draco::PointAttribute& attribute = *cloud.attribute(0);
+  return attribute.size() == count && attribute.is_mapping_identity() &&
+         attribute.buffer()->data_size() == count * sizeof(uint32_t);
+}
+
+void AppendSymbols(const draco::PointCloud& cloud, std::vector<uint32_t>& symbols) {
+  const size_t begin = symbols.size();
+  symbols.resize(begin + cloud.num_points());
+  cloud.attribute(0)->buffer()->Read(0, symbols.data() + begin, cloud.num_points() * sizeof(uint32_t));
+  for (size_t i = begin; i < symbols.size(); ++i) symbols[i] = ZigZag(symbols[i]);
+}
+
 absl::Status DecodeCloud(absl::string_view& bytes, size_t count, std::vector<uint32_t>& symbols) {
   draco::DecoderBuffer buffer;
   buffer.Init(bytes.data(), bytes.size());
   draco::PointCloud cloud;
   draco::Decoder decoder;
-  const draco::Status status = decoder.DecodeBufferToGeometry(&buffer, &cloud);
-  if (!status.ok()) return CorruptPayload("a Draco blob cannot be decoded");
-  const draco::PointAttribute* attribute = cloud.num_attributes() == 1 ? cloud.attribute(0) : nullptr;
-  const bool as_claimed = attribute != nullptr && cloud.num_points() == count && attribute->size() == count &&
-                          attribute->is_mapping_identity() && buffer.remaining_size() >= 0 &&
-                          attribute->buffer()->data_size() == count * sizeof(uint32_t);
-  if (!as_claimed) return CorruptPayload("a Draco blob holds other than its header says");
-  const size_t begin = symbols.size();
-  symbols.resize(begin + count);
-  attribute->buffer()->Read(0, symbols.data() + begin, count * sizeof(uint32_t));
-  for (size_t i = begin; i < symbols.size(); ++i) symbols[i] = ZigZag(symbols[i]);
+  const bool decoded = decoder.DecodeBufferToGeometry(&buffer, &cloud).ok();
+  if (!decoded || buffer.remaining_size() < 0) return CorruptPayload("a Draco blob cannot be decoded");
+  if (!HoldsSymbols(cloud, count)) return CorruptPayload("a Draco blob holds other than its header says");
+  AppendSymbols(cloud, symbols);
   bytes.remove_prefix(bytes.size() - buffer.remaining_size());
   return absl::OkStatus();
 }
@@ -85,8 +92,9 @@ absl::Status DecodeCloud(absl::string_view& bytes, size_t count, std::vector<uin
 }  // namespace
 
 absl::StatusOr<std::string> DracoEncode(absl::Span<const uint32_t> symbols) try {
-  if (symbols.empty() || symbols.size() > kMaxPoints)
+  if (symbols.empty() || symbols.size() > kMaxPoints) {
     return DracoError("Draco cannot code that many symbols");
+  }
   DYNMESH_ASSIGN_OR_RETURN(std::string blob, EncodeCloud(symbols));
   const std::string prefix = BlobPrefix(symbols.size());
   if (blob.compare(0, prefix.size(), prefix) != 0) return DracoError("Draco writes an unknown header");
@@ -98,8 +106,9 @@ absl::StatusOr<std::string> DracoEncode(absl::Span<const uint32_t> symbols) try 
 absl::Status DracoDecode(absl::string_view& bytes, size_t count, std::vector<uint32_t>& symbols) try {
   if (count == 0 || count > kMaxPoints) return CorruptPayload("a Draco blob cannot hold that many symbols");
   const std::string prefix = BlobPrefix(count);
-  if (bytes.substr(0, prefix.size()) != prefix)
+  if (bytes.substr(0, prefix.size()) != prefix) {
     return CorruptPayload("a Draco blob's header is not as expected");
+  }
   return DecodeCloud(bytes, count, symbols);
 } catch (const std::bad_alloc&) {
   throw;

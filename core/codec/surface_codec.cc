@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <new>
 
 #include "absl/strings/str_cat.h"
@@ -64,25 +65,32 @@ absl::Status CheckSurface(const TriangleSurface& surface, int position_bits) {
 
 bool IsDegenerate(const Triangle& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; }
 
+// For each vertex its row in the table of those that a triangle uses; kUnused for the others.
+constexpr uint32_t kUnused = UINT32_MAX;
+std::vector<uint32_t> NumberUsed(const std::vector<Triangle>& triangles, size_t num_vertices) {
+  std::vector<uint32_t> rows(num_vertices, kUnused);
+  for (const Triangle& t : triangles) {
+    for (uint32_t v : t) rows[v] = 0;
+  }
+  uint32_t next = 0;
+  for (uint32_t& row : rows) {
+    if (row != kUnused) row = next++;
+  }
+  return rows;
+}
+
 // Without degenerate triangles and without the vertices that no other triangle uses.
 TriangleSurface Tidy(const TriangleSurface& surface) {
-  constexpr uint32_t kUnused = UINT32_MAX;
   TriangleSurface tidy;
   std::remove_copy_if(surface.triangles.begin(), surface.triangles.end(), std::back_inserter(tidy.triangles),
                       IsDegenerate);
-  std::vector<uint32_t> index(surface.positions.size(), kUnused);
-  for (const Triangle& t : tidy.triangles) {
-    for (uint32_t v : t) index[v] = 0;
-  }
-  for (size_t v = 0; v < index.size(); ++v) {
-    if (index[v] == kUnused) continue;
-    index[v] = tidy.positions.size();
+  const std::vector<uint32_t> rows = NumberUsed(tidy.triangles, surface.positions.size());
+  for (size_t v = 0; v < rows.size(); ++v) {
+    if (rows[v] == kUnused) continue;
     tidy.positions.push_back(surface.positions[v]);
     tidy.vertex_slots.push_back(surface.vertex_slots[v]);
   }
-  for (Triangle& t : tidy.triangles) {
-    for (uint32_t& v : t) v = index[v];
-  }
+  for (Triangle& t : tidy.triangles) t = {rows[t[0]], rows[t[1]], rows[t[2]]};
   return tidy;
 }
 
@@ -164,23 +172,21 @@ std::vector<uint32_t> MergeBySlot(const draco::Mesh& mesh, const draco::PointAtt
   std::sort(table.begin(), table.end());
   table.erase(std::unique(table.begin(), table.end()), table.end());
   std::vector<uint32_t> rows;
-  for (VertexId slot : slots)
+  for (VertexId slot : slots) {
     rows.push_back(std::lower_bound(table.begin(), table.end(), slot) - table.begin());
+  }
   return rows;
 }
 
-absl::StatusOr<TriangleSurface> FromMesh(const draco::Mesh& mesh) {
-  const draco::PointAttribute* positions = mesh.GetNamedAttribute(draco::GeometryAttribute::POSITION);
-  const draco::PointAttribute* slots = mesh.GetNamedAttribute(draco::GeometryAttribute::GENERIC);
-  if (!IsPositionAttribute(positions) || !IsSlotAttribute(slots)) {
-    return CorruptPayload("the surface has no positions or no vertex slots");
-  }
+// REQUIRES: attributes that IsPositionAttribute and IsSlotAttribute.
+TriangleSurface ToSurface(const draco::Mesh& mesh, const draco::PointAttribute& positions,
+                          const draco::PointAttribute& slots) {
   TriangleSurface surface;
-  const std::vector<uint32_t> rows = MergeBySlot(mesh, *slots, surface);
+  const std::vector<uint32_t> rows = MergeBySlot(mesh, slots, surface);
   surface.positions.resize(surface.vertex_slots.size());
   for (PointIndex p(0); p < mesh.num_points(); ++p) {
     float xyz[3];
-    positions->GetMappedValue(p, xyz);
+    positions.GetMappedValue(p, xyz);
     surface.positions[rows[p.value()]] = {xyz[0], xyz[1], xyz[2]};
   }
   for (FaceIndex f(0); f < mesh.num_faces(); ++f) {
@@ -188,6 +194,22 @@ absl::StatusOr<TriangleSurface> FromMesh(const draco::Mesh& mesh) {
     surface.triangles.push_back({rows[face[0].value()], rows[face[1].value()], rows[face[2].value()]});
   }
   return surface;
+}
+
+absl::StatusOr<TriangleSurface> DecodeMesh(const std::string& bytes) {
+  draco::DecoderBuffer buffer;
+  buffer.Init(bytes.data(), bytes.size());
+  draco::Mesh mesh;
+  draco::Decoder decoder;
+  if (!decoder.DecodeBufferToGeometry(&buffer, &mesh).ok()) {
+    return CorruptPayload("the surface cannot be decoded");
+  }
+  const draco::PointAttribute* positions = mesh.GetNamedAttribute(draco::GeometryAttribute::POSITION);
+  const draco::PointAttribute* slots = mesh.GetNamedAttribute(draco::GeometryAttribute::GENERIC);
+  if (!IsPositionAttribute(positions) || !IsSlotAttribute(slots)) {
+    return CorruptPayload("the surface has no positions or no vertex slots");
+  }
+  return ToSurface(mesh, *positions, *slots);
 }
 
 }  // namespace
@@ -207,13 +229,7 @@ absl::StatusOr<std::string> EncodeSurface(const TriangleSurface& surface, int po
 }
 
 absl::StatusOr<TriangleSurface> DecodeSurface(const std::string& bytes) try {
-  draco::DecoderBuffer buffer;
-  buffer.Init(bytes.data(), bytes.size());
-  draco::Mesh mesh;
-  draco::Decoder decoder;
-  if (!decoder.DecodeBufferToGeometry(&buffer, &mesh).ok())
-    return CorruptPayload("the surface cannot be decoded");
-  return FromMesh(mesh);
+  return DecodeMesh(bytes);
 } catch (const std::bad_alloc&) {
   return OutOfMemory();
 } catch (...) {

@@ -44,8 +44,8 @@ void KeepSmaller(Packing packing, std::string bytes, Packed& best) {
 
 // One Draco blob where every symbol is small enough, else one for the low and one for the high halves.
 absl::StatusOr<std::string> DracoBlobs(absl::Span<const uint32_t> symbols) {
-  const uint32_t largest = *std::max_element(symbols.begin(), symbols.end());
-  if (largest < kDracoSymbolLimit) return DracoEncode(symbols);
+  const auto largest = std::max_element(symbols.begin(), symbols.end());
+  if (symbols.empty() || *largest < kDracoSymbolLimit) return DracoEncode(symbols);
   Symbols low(symbols.size());
   Symbols high(symbols.size());
   for (size_t i = 0; i < symbols.size(); ++i) {
@@ -58,13 +58,23 @@ absl::StatusOr<std::string> DracoBlobs(absl::Span<const uint32_t> symbols) {
 }
 
 // The first symbol is often far larger than the rest (a first slot), so it stays out of Draco's tables.
+// REQUIRES: not empty.
 absl::StatusOr<std::string> PackDraco(absl::Span<const uint32_t> symbols) {
-  if (symbols.size() < 2) return CorruptPayload("Draco packs no empty streams");
   DYNMESH_ASSIGN_OR_RETURN(const std::string blobs, DracoBlobs(symbols.subspan(1)));
   ByteWriter out;
   out.Varint(symbols[0]);
   out.Bytes(blobs);
   return std::move(out).Take();
+}
+
+// Puts the high halves into symbols[1], symbols[2], ...
+absl::Status AddHighHalves(const Symbols& high, Symbols& symbols) {
+  for (size_t i = 0; i < high.size(); ++i) {
+    uint32_t& symbol = symbols[i + 1];
+    if ((symbol | high[i]) > kLowMask) return CorruptPayload("a Draco section's halves overlap");
+    symbol |= high[i] << kLowBits;
+  }
+  return absl::OkStatus();
 }
 
 absl::StatusOr<Symbols> UnpackDraco(absl::string_view bytes, size_t count) {
@@ -74,15 +84,11 @@ absl::StatusOr<Symbols> UnpackDraco(absl::string_view bytes, size_t count) {
   if (!in.ok() || first > UINT32_MAX) return CorruptPayload("a Draco section has no first symbol");
   absl::string_view blobs = in.Bytes(in.remaining());
   Symbols symbols(1, static_cast<uint32_t>(first));
-  symbols.reserve(count);
   DYNMESH_RETURN_IF_ERROR(DracoDecode(blobs, count - 1, symbols));
   if (blobs.empty()) return symbols;
   Symbols high;
   DYNMESH_RETURN_IF_ERROR(DracoDecode(blobs, count - 1, high));
-  for (size_t i = 0; i < high.size(); ++i) {
-    if ((symbols[i + 1] | high[i]) > kLowMask) return CorruptPayload("a Draco section's halves overlap");
-    symbols[i + 1] |= high[i] << kLowBits;
-  }
+  DYNMESH_RETURN_IF_ERROR(AddHighHalves(high, symbols));
   if (!blobs.empty()) return CorruptPayload("a Draco section has bytes left over");
   return symbols;
 }
@@ -112,14 +118,16 @@ absl::StatusOr<Symbols> UnpackVarints(absl::string_view bytes, size_t count) {
 
 Packed PackSymbols(absl::Span<const uint32_t> symbols, Codec codec) {
   if (codec == Codec::kRaw || symbols.empty()) return RawArray(symbols);
-  Packed best{Packing::kVarint, symbols.size(), Varints(symbols)};
-  if (codec == Codec::kDraco || (codec == Codec::kUnspecified && symbols.size() >= kMinAutoDraco)) {
+  if (codec == Codec::kDraco) {
     absl::StatusOr<std::string> blobs = PackDraco(symbols);
-    if (blobs.ok() && codec == Codec::kDraco) return {Packing::kDraco, symbols.size(), *std::move(blobs)};
+    if (blobs.ok()) return {Packing::kDraco, symbols.size(), *std::move(blobs)};
+  }
+  Packed best{Packing::kVarint, symbols.size(), Varints(symbols)};
+  if (best.bytes.size() >= kMinZstd) KeepSmaller(Packing::kZstd, CompressFrame(best.bytes), best);
+  if (codec == Codec::kUnspecified && symbols.size() >= kMinAutoDraco) {
+    absl::StatusOr<std::string> blobs = PackDraco(symbols);
     if (blobs.ok()) KeepSmaller(Packing::kDraco, *std::move(blobs), best);
   }
-  const std::string varints = Varints(symbols);
-  if (varints.size() >= kMinZstd) KeepSmaller(Packing::kZstd, CompressFrame(varints), best);
   return AsBytes(symbols).size() < best.bytes.size() ? RawArray(symbols) : best;
 }
 

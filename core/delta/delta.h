@@ -40,7 +40,8 @@ struct AttributeChanges {
 /// the chunk with consistent = true does the copy equal the session at `to_revision`.
 ///
 /// Invariants (checked by CheckDelta): slot lists ascend; sizes agree; no slot is both removed and upserted;
-/// element types have the dimension of their list; positions and float attributes are finite.
+/// no slot, also of an element's vertex, is kNoSlot; element types have the dimension of their list;
+/// attribute specs are valid; positions and float attributes are finite.
 struct Delta {
   int64_t from_revision = 0;           ///< 0: from nothing
   int64_t to_revision = 0;

@@ -35,8 +35,9 @@ absl::Status CheckAttributeSpec(const AttributeSpec& spec) {
   if (!IsName(spec.name)) {
     return InvalidArgument(reason::kBadArgument, "an attribute's name is 1-64 bytes of [A-Za-z0-9_.-]");
   }
-  if (static_cast<int>(spec.kind) >= kNumEntityKinds)
+  if (static_cast<int>(spec.kind) >= kNumEntityKinds) {
     return BadSpec(spec, "an attribute is of an entity kind");
+  }
   if (ScalarBytes(spec.type) == 0) return BadSpec(spec, "an attribute is of type float64 or int32");
   if (spec.components < 1 || spec.components > kMaxAttributeComponents) {
     return BadSpec(spec, absl::StrCat("an attribute has 1-16 components, not ", spec.components));
