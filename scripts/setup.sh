@@ -7,7 +7,7 @@ set -euo pipefail
 build_packages=(
   g++ cmake ninja-build ccache pkg-config
   libgrpc++-dev libprotobuf-dev protobuf-compiler protobuf-compiler-grpc
-  libabsl-dev libspdlog-dev libdraco-dev libzstd-dev libxxhash-dev libboost-dev
+  libabsl-dev libspdlog-dev libdraco-dev libzstd-dev libxxhash-dev
   python3 python3-dev python3-venv python3-setuptools python3-pybind11 pybind11-dev
   python3-grpcio python3-protobuf python3-numpy python3-meshio python3-tqdm
 )

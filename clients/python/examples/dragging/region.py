@@ -1,0 +1,92 @@
+"""What is dragged: a ball or a cylinder that carries everything inside, and pulls less and less around it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .elements import Floats
+
+# Of a mesh that is not the demo's own: at most so many vertices move, and at most this part of them.
+_MOST_VERTICES = 4000
+_LARGEST_PART = 0.25
+
+
+@dataclass(frozen=True)
+class Region:
+    """A field of displacements around a centre that travels.
+
+    Points nearer than `inner` to the centre move as it does, those beyond `outer` stay, and in between the pull
+    fades smoothly. Each step is a small one-to-one map of space, so it is the mesh that wears out, not the shape.
+
+    Attributes
+    ----------
+    inner, outer : float
+    extent : float64[3]
+        1 for axes in which distance counts: a cylinder along z has (1, 1, 0), a ball (1, 1, 1).
+    path : callable
+        The centre, float64[3], for a time from 0 to 1.
+    """
+
+    inner: float
+    outer: float
+    extent: Floats
+    path: Callable[[float], Floats]
+
+    def distances(self, points: Floats, centre: Floats) -> Floats:
+        """Of points, float64[n, 3], from the centre: float64[n]."""
+        return np.linalg.norm((points - centre) * self.extent, axis=1)
+
+    def pull(self, points: Floats, centre: Floats) -> Floats:
+        """How much of the centre's step each point takes part in, 0 to 1: float64[n]."""
+        s = np.clip((self.distances(points, centre) - self.inner) / (self.outer - self.inner), 0, 1)
+        return 1 - s * s * (3 - 2 * s)
+
+    def within_reach(self, points: Floats) -> NDArray[np.bool_]:
+        """Which points the region can ever pull: bool[n]."""
+        centres = [self.path(t) for t in np.linspace(0, 1, 65)]
+        spacing = max(np.linalg.norm(b - a) for a, b in zip(centres, centres[1:]))
+        nearest = np.min([self.distances(points, centre) for centre in centres], axis=0)
+        return nearest <= self.outer + spacing
+
+
+def hole_region(centre: Floats, radius: float, travel: float) -> Region:
+    """A hole along the z axis, dragged in a slalom along the x axis."""
+
+    def path(t: float) -> Floats:
+        return centre + travel * np.array([t, 0.14 * np.sin(2 * np.pi * t), 0])
+
+    return Region(1.1 * radius, 2.3 * radius, np.array([1.0, 1.0, 0.0]), path)
+
+
+def ball_region(points: Floats, start: Floats) -> Region | None:
+    """A ball round `start` that is pulled away from the middle of the points and bends to the side.
+
+    Returns None where there is nothing to pull: all points at one place.
+    """
+    middle = (points.min(axis=0) + points.max(axis=0)) / 2
+    distances = np.linalg.norm(points - start, axis=1)
+    count = min(_MOST_VERTICES, max(int(_LARGEST_PART * len(points)), 4), len(points) - 1)
+    outer = float(np.partition(distances, count)[count]) if count > 0 else 0.0
+    if outer <= 0:
+        return None
+    out, aside = _directions(points, start - middle)
+
+    def path(t: float) -> Floats:
+        return start + 1.2 * outer * (t * out + 0.4 * t * t * aside)
+
+    return Region(0.35 * outer, outer, np.ones(3), path)
+
+
+def _directions(points: Floats, outward: Floats) -> tuple[Floats, Floats]:
+    """Unit vectors: outward, and across it within the plane or space that the points span."""
+    spread, axes = np.linalg.svd(points[:: max(len(points) // 1000, 1)] - points.mean(axis=0), full_matrices=False)[1:]
+    spanned = axes[spread > 1e-6 * spread[0]]
+    out = outward / np.linalg.norm(outward) if np.linalg.norm(outward) > 0 else spanned[0]
+    across = [axis - (axis @ out) * out for axis in spanned]
+    aside = max(across, key=np.linalg.norm)
+    length = np.linalg.norm(aside)
+    return out, aside / length if length > 1e-6 else np.zeros(3)

@@ -1,0 +1,100 @@
+"""dynmesh: named mesh sessions in a daemon, edited and followed from Python.
+
+>>> import dynmesh
+>>> with dynmesh.launch() as daemon:
+...     session = daemon.client.create_session("part")
+...     session.import_mesh("part.vtu")
+...     stars = session.neighbors("vertex", "cell", session.boundary("vertex"))
+...     with session.edit() as tx:
+...         tx.move_vertices([0], [[0.0, 0.0, 0.1]])
+...     with session.mirror() as mirror:
+...         mirror.wait(tx.result.revision)
+"""
+
+from .checksum import Checksum
+from .client import Client, connect
+from .daemon import Daemon, launch
+from .delta import Delta
+from .edit import EditBatch, EditResult, Transaction
+from .edit_stream import EditStream
+from .errors import (
+    AbortedError,
+    AlreadyExistsError,
+    CancelledError,
+    DataLossError,
+    DeadlineExceededError,
+    DynmeshError,
+    FailedPreconditionError,
+    FileFormatError,
+    InternalError,
+    InvalidArgumentError,
+    LaunchError,
+    MirrorError,
+    NotFoundError,
+    OutOfRangeError,
+    PermissionDeniedError,
+    ResourceExhaustedError,
+    UnauthenticatedError,
+    UnavailableError,
+    UnimplementedError,
+)
+from .info import AttributeSpec, Counts, MeshWarning, SessionInfo
+from .kinds import ElementType, EntityKind
+from .mirror import Elements, Mirror, Update
+from .mirror_stats import MirrorStats
+from .queries import Csr, Entities, Surface
+from .session import Session
+from .snapshot import Attribute, Block, Snapshot
+from .transfer import ImportResult
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "AbortedError",
+    "AlreadyExistsError",
+    "Attribute",
+    "AttributeSpec",
+    "Block",
+    "CancelledError",
+    "Checksum",
+    "Client",
+    "Counts",
+    "Csr",
+    "Daemon",
+    "DataLossError",
+    "DeadlineExceededError",
+    "Delta",
+    "DynmeshError",
+    "EditBatch",
+    "EditResult",
+    "EditStream",
+    "ElementType",
+    "Elements",
+    "Entities",
+    "EntityKind",
+    "FailedPreconditionError",
+    "FileFormatError",
+    "ImportResult",
+    "InternalError",
+    "InvalidArgumentError",
+    "LaunchError",
+    "MeshWarning",
+    "Mirror",
+    "MirrorError",
+    "MirrorStats",
+    "NotFoundError",
+    "OutOfRangeError",
+    "PermissionDeniedError",
+    "ResourceExhaustedError",
+    "Session",
+    "SessionInfo",
+    "Snapshot",
+    "Surface",
+    "Transaction",
+    "UnauthenticatedError",
+    "UnavailableError",
+    "UnimplementedError",
+    "Update",
+    "connect",
+    "launch",
+]

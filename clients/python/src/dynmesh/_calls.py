@@ -1,0 +1,93 @@
+"""How every call is made: a deadline, errors as `DynmeshError`, and retries where they are harmless."""
+
+from __future__ import annotations
+
+import math
+import random
+import time
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any, TypeVar
+
+import grpc
+
+from .errors import UnavailableError, from_rpc_error
+
+Reply = TypeVar("Reply")
+
+_FIRST_BACKOFF_S = 0.05
+_MAX_BACKOFF_S = 2.0
+
+
+class Backoff:
+    """Growing pauses between attempts, with jitter so that many clients do not return in step."""
+
+    def __init__(self) -> None:
+        self._next_s = _FIRST_BACKOFF_S
+
+    def reset(self) -> None:
+        """Starts again with the shortest pause."""
+        self._next_s = _FIRST_BACKOFF_S
+
+    def next_s(self) -> float:
+        """Seconds to wait before the next attempt."""
+        pause = self._next_s * random.uniform(0.75, 1.25)
+        self._next_s = min(2 * self._next_s, _MAX_BACKOFF_S)
+        return pause
+
+
+class Caller:
+    """Makes the calls of one client.
+
+    Parameters
+    ----------
+    timeout : float
+        Seconds that a call may take unless it says otherwise; ``math.inf`` for no limit.
+    retries : int
+        How often a call that may be repeated is repeated when nobody answers.
+    """
+
+    def __init__(self, timeout: float, retries: int) -> None:
+        self._timeout = timeout
+        self._retries = retries
+
+    def unary(
+        self, method: Callable[..., Reply], request: Any, timeout: float | None, *, repeatable: bool
+    ) -> Reply:
+        """One request, one reply. `repeatable`: doing it twice is the same as doing it once."""
+        deadline = time.monotonic() + self._seconds(timeout)
+        backoff = Backoff()
+        for left in reversed(range(self._retries + 1 if repeatable else 1)):
+            try:
+                return _once(method, request, deadline)
+            except UnavailableError:
+                pause = backoff.next_s()
+                if left == 0 or time.monotonic() + pause >= deadline:
+                    raise
+                time.sleep(pause)
+        raise AssertionError("the last attempt returns or raises")
+
+    def stream(
+        self, method: Callable[..., Iterable[Reply]], request: Any, timeout: float | None
+    ) -> Iterator[Reply]:
+        """The replies of a streaming call; cancelled when the iterator is dropped early."""
+        call = method(request, timeout=_grpc_timeout(self._seconds(timeout)))
+        try:
+            yield from call
+        except grpc.RpcError as error:
+            raise from_rpc_error(error) from None
+        finally:
+            call.cancel()  # type: ignore[attr-defined]
+
+    def _seconds(self, timeout: float | None) -> float:
+        return self._timeout if timeout is None else timeout
+
+
+def _once(method: Callable[..., Reply], request: Any, deadline: float) -> Reply:
+    try:
+        return method(request, timeout=_grpc_timeout(max(deadline - time.monotonic(), 0.0)))
+    except grpc.RpcError as error:
+        raise from_rpc_error(error) from None
+
+
+def _grpc_timeout(seconds: float) -> float | None:
+    return None if math.isinf(seconds) else seconds

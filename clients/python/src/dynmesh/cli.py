@@ -1,0 +1,257 @@
+"""The command ``dynmesh``.
+
+Exit codes: 0 done, 1 refused or failed (one line with the reason on stderr), 2 wrong usage, 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+from .cli_watch import watch
+from .client import DEFAULT_TARGET, DEFAULT_TIMEOUT_S, Client, connect
+from .daemon import find_daemon
+from .errors import DynmeshError
+from .files import read_mesh
+from .info import SessionInfo
+from .transfer import ImportResult
+
+_EXIT_ERROR, _EXIT_INTERRUPTED = 1, 130
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs one command; returns the exit code."""
+    parser = make_parser()
+    args, rest = parser.parse_known_args(arguments)
+    if rest and args.run is not _serve:
+        parser.error(f"unrecognized arguments: {' '.join(rest)}")
+    args.rest = rest
+    try:
+        return int(args.run(args) or 0)
+    except BrokenPipeError:  # whoever read the output has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except (DynmeshError, OSError) as error:
+        print(f"dynmesh: {_one_line(error)}", file=sys.stderr)
+        return _EXIT_ERROR
+    except KeyboardInterrupt:
+        return _EXIT_INTERRUPTED
+
+
+def make_parser() -> argparse.ArgumentParser:
+    """The command line; ``args.run(args)`` does what was asked for."""
+    parser = argparse.ArgumentParser(
+        prog="dynmesh",
+        description="Named mesh sessions in a dynmesh daemon.",
+        epilog="The daemon is found by --target, else by the environment variable DYNMESH_TARGET.",
+    )
+    parser.set_defaults(
+        target=os.environ.get("DYNMESH_TARGET", DEFAULT_TARGET), timeout=DEFAULT_TIMEOUT_S, json=False
+    )
+    _add_common(parser)
+    commands = parser.add_subparsers(metavar="COMMAND", required=True)
+    _add_serve(commands)
+    _add_writing(commands)
+    _add_reading(commands)
+    return parser
+
+
+def _add_common(parser: argparse.ArgumentParser) -> None:
+    """Options that may stand before the command or after it."""
+    suppress = argparse.SUPPRESS
+    parser.add_argument("--target", metavar="ADDRESS", default=suppress, help="host:port or unix:/path")
+    parser.add_argument("--timeout", metavar="SECONDS", type=float, default=suppress, help="of each call")
+    parser.add_argument("--json", action="store_true", default=suppress, help="output for programs")
+
+
+def _command(commands: Any, name: str, run: Any, help_text: str, **options: Any) -> argparse.ArgumentParser:
+    parser: argparse.ArgumentParser = commands.add_parser(
+        name, help=help_text, description=help_text, **options
+    )
+    parser.set_defaults(run=run)
+    _add_common(parser)
+    return parser
+
+
+def _add_serve(commands: Any) -> None:
+    serve = _command(
+        commands,
+        "serve",
+        _serve,
+        "Become a dynmeshd. All other options are passed on to it; dynmeshd --help lists them.",
+    )
+    serve.add_argument("--binary", metavar="PATH", help="the dynmeshd to run")
+
+
+def _add_writing(commands: Any) -> None:
+    create = _command(commands, "create", _create, "Make a session, empty or filled from a mesh file.")
+    create.add_argument("name", metavar="NAME")
+    create.add_argument("file", metavar="FILE", nargs="?", help="any format that meshio reads")
+    create.add_argument(
+        "--duplicates", choices=("keep", "refuse"), default="keep", help="equal elements (keep)"
+    )
+    _add_attributes(create)
+    fill = _command(commands, "import", _import, "Fill an empty session from a mesh file.")
+    fill.add_argument("name", metavar="NAME")
+    fill.add_argument("file", metavar="FILE", help="any format that meshio reads")
+    _add_attributes(fill)
+    remove = _command(commands, "rm", _rm, "Delete a session. Asks first when typed at a terminal.")
+    remove.add_argument("name", metavar="NAME")
+    remove.add_argument("--yes", action="store_true", help="do not ask")
+
+
+def _add_attributes(parser: argparse.ArgumentParser) -> None:
+    help_text = "point and cell data to take, separated by commas; empty for none (default: all)"
+    parser.add_argument("--attributes", metavar="NAMES", type=_names, help=help_text)
+
+
+def _add_reading(commands: Any) -> None:
+    _command(commands, "ls", _ls, "List the sessions.")
+    info = _command(commands, "info", _info, "Show what a session is and holds.")
+    info.add_argument("name", metavar="NAME")
+    export = _command(commands, "export", _export, "Write a session to a mesh file.")
+    export.add_argument("name", metavar="NAME")
+    export.add_argument(
+        "file", metavar="FILE", help="its extension chooses the format: .vtu, .msh, .xdmf, ..."
+    )
+    export.add_argument("--no-slots", action="store_true", help="leave out the ids (dynmesh:slot)")
+    follow = _command(commands, "watch", _watch, "Follow a session: a line for each step, until interrupted.")
+    follow.add_argument("name", metavar="NAME")
+    follow.add_argument("--count", metavar="N", type=int, help="end after so many steps")
+    follow.add_argument("--codec", choices=("auto", "draco", "zstd", "raw"), default="auto", help="(auto)")
+    follow.add_argument(
+        "--min-interval", metavar="SECONDS", type=float, default=0.0, help="between steps (0)"
+    )
+
+
+# ---- Commands ----
+
+
+def _serve(args: argparse.Namespace) -> int:
+    binary = find_daemon(args.binary)
+    sys.stdout.flush()
+    os.execv(binary, [binary, *args.rest])
+
+
+def _create(args: argparse.Namespace) -> None:
+    mesh = read_mesh(args.file) if args.file else None  # first: a file that cannot be read makes no session
+    with _client(args) as client:
+        session = client.create_session(args.name, duplicates=args.duplicates)
+        if mesh is None:
+            return _print_info(args, session.info())
+        try:
+            result = session.import_mesh(mesh, attributes=args.attributes)
+        except BaseException:
+            session.delete()
+            raise
+        _print_import(args, result)
+
+
+def _import(args: argparse.Namespace) -> None:
+    mesh = read_mesh(args.file)
+    with _client(args) as client:
+        _print_import(args, client.session(args.name).import_mesh(mesh, attributes=args.attributes))
+
+
+def _export(args: argparse.Namespace) -> None:
+    with _client(args) as client:
+        snapshot = client.session(args.name).export(args.file, slots=not args.no_slots)
+    elements = {block.type.meshio_name: len(block.ids) for block in snapshot.blocks}
+    report = {
+        "file": args.file,
+        "revision": snapshot.revision,
+        "vertices": len(snapshot.vertex_ids),
+        **elements,
+    }
+    _print(args, report, ", ".join(f"{key} {value}" for key, value in report.items()))
+
+
+def _ls(args: argparse.Namespace) -> None:
+    with _client(args) as client:
+        infos = list(client.sessions())
+    lines = [f"{'NAME':24} {'REVISION':>9} {'VERTICES':>10} {'EDGES':>10} {'FACES':>10} {'CELLS':>10}"]
+    lines += [_row(info) for info in infos]
+    _print(args, [info.to_dict() for info in infos], "\n".join(lines))
+
+
+def _info(args: argparse.Namespace) -> None:
+    with _client(args) as client:
+        _print_info(args, client.session(args.name).info())
+
+
+def _watch(args: argparse.Namespace) -> int:
+    with _client(args) as client:
+        return watch(client.session(args.name), args)
+
+
+def _rm(args: argparse.Namespace) -> int | None:
+    ask = sys.stdin.isatty() and not args.yes and not args.json
+    if ask and not _confirmed(f"delete session {args.name}?"):
+        return _EXIT_ERROR
+    with _client(args) as client:
+        revision = client.delete_session(args.name)
+    _print(args, {"name": args.name, "revision": revision}, f"deleted {args.name} at revision {revision}")
+    return None
+
+
+# ---- Output ----
+
+
+def _client(args: argparse.Namespace) -> Client:
+    return connect(args.target, timeout=args.timeout)
+
+
+def _confirmed(question: str) -> bool:
+    return input(f"{question} [y/N] ").strip().lower() in ("y", "yes")
+
+
+def _names(text: str) -> list[str]:
+    return [name for name in text.split(",") if name]
+
+
+def _one_line(error: BaseException) -> str:
+    return " ".join(str(error).split())
+
+
+def _print(args: argparse.Namespace, value: Any, text: str) -> None:
+    print(json.dumps(value) if args.json else text, flush=True)
+
+
+def _print_import(args: argparse.Namespace, result: ImportResult) -> None:
+    for warning in result.warnings:
+        print(f"dynmesh: warning: {warning}", file=sys.stderr)
+    _print_info(args, result.info)
+
+
+def _print_info(args: argparse.Namespace, info: SessionInfo) -> None:
+    _print(args, info.to_dict(), _describe(info))
+
+
+def _row(info: SessionInfo) -> str:
+    counts = " ".join(f"{count:10}" for count in info.counts)
+    return f"{info.name:24} {info.revision:9} {counts}"
+
+
+def _describe(info: SessionInfo) -> str:
+    """An aligned listing for humans."""
+    lines = [f"{info.name} at revision {info.revision}, changed {info.update_time:%Y-%m-%d %H:%M:%S} UTC", ""]
+    lines.append(f"{'':10} {'vertices':>12} {'edges':>12} {'faces':>12} {'cells':>12}")
+    for title, counts in (
+        ("live", info.counts),
+        ("estimated", info.estimated_counts),
+        ("boundary", info.boundary_counts),
+        ("elements", info.element_counts),
+    ):
+        lines.append(f"{title:10} " + " ".join(f"{count:12}" for count in counts))
+    lines += ["", f"checksum   {info.checksum}", f"Euler      {info.euler_characteristic}"]
+    lines += [f"memory     {info.memory_bytes / 2**20:.1f} MiB", f"followers  {info.followers}"]
+    if info.bounds is not None:
+        low, high = (" ".join(f"{x:g}" for x in corner) for corner in info.bounds)
+        lines.append(f"bounds     ({low}) to ({high})")
+    for spec in info.attributes:
+        lines.append(f"attribute  {spec.name}: {spec.dtype}[{spec.components}] of {spec.kind}")
+    return "\n".join(lines)

@@ -1,0 +1,126 @@
+"""Attaching to a daemon."""
+
+from __future__ import annotations
+
+import uuid
+from collections.abc import Iterator
+from types import TracebackType
+
+import grpc
+
+from ._calls import Caller
+from .errors import InvalidArgumentError
+from .info import SessionInfo, info_from_proto
+from .session import Session
+from .v1 import sessions_pb2, sessions_pb2_grpc
+
+DEFAULT_TARGET = "127.0.0.1:7447"
+DEFAULT_TIMEOUT_S = 60.0
+
+_PAGE_SIZE = 1000
+_POLICIES = {"keep": sessions_pb2.DUPLICATE_POLICY_KEEP, "refuse": sessions_pb2.DUPLICATE_POLICY_REFUSE}
+_CHANNEL_OPTIONS = (
+    ("grpc.max_receive_message_length", -1),  # deltas are as large as the server's own limit allows
+    ("grpc.max_send_message_length", -1),  # the server refuses what is too large, and says so
+    ("grpc.keepalive_time_ms", 30_000),  # a mirror learns of a peer that vanished; the server allows it
+    ("grpc.keepalive_timeout_ms", 10_000),
+    ("grpc.http2.max_pings_without_data", 0),
+    ("grpc.initial_reconnect_backoff_ms", 100),
+    ("grpc.max_reconnect_backoff_ms", 2000),
+    ("grpc.use_local_subchannel_pool", 1),  # clients of one process have connections of their own
+)
+
+
+class Client:
+    """A connection to a daemon; made by `dynmesh.connect`.
+
+    Thread safety: everything may be called from any thread.
+    """
+
+    def __init__(self, target: str, timeout: float, retries: int) -> None:
+        self.target = target
+        self._channel = grpc.insecure_channel(target, options=_CHANNEL_OPTIONS)
+        self._caller = Caller(timeout, retries)
+        self._sessions = sessions_pb2_grpc.SessionServiceStub(self._channel)
+
+    def __repr__(self) -> str:
+        return f"<dynmesh.Client {self.target!r}>"
+
+    def __enter__(self) -> Client:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Closes the connection; mirrors that use it end."""
+        self._channel.close()
+
+    def session(self, name: str) -> Session:
+        """The session `name`, which need not exist yet. No call."""
+        return Session(name, self._channel, self._caller)
+
+    def create_session(
+        self,
+        name: str,
+        *,
+        duplicates: str = "keep",
+        request_id: str | None = None,
+        timeout: float | None = None,
+    ) -> Session:
+        """Makes an empty session at revision 0.
+
+        Parameters
+        ----------
+        name : str
+            1-64 characters of [A-Za-z0-9_.-], beginning with a letter or digit.
+        duplicates : "keep" or "refuse"
+            What happens to an element that equals a live one (same type, same vertices up to symmetry).
+        request_id : str, optional
+            A retry with the same id gets the first answer. Default: a new one.
+
+        Raises
+        ------
+        AlreadyExistsError, InvalidArgumentError
+        """
+        if duplicates not in _POLICIES:
+            raise InvalidArgumentError(f'duplicates is "keep" or "refuse", not {duplicates!r}')
+        request = sessions_pb2.CreateSessionRequest(
+            name=name,
+            settings=sessions_pb2.SessionSettings(duplicate_policy=_POLICIES[duplicates]),
+            request_id=request_id or uuid.uuid4().hex,
+        )
+        self._caller.unary(self._sessions.CreateSession, request, timeout, repeatable=True)
+        return self.session(name)
+
+    def sessions(self, *, timeout: float | None = None) -> Iterator[SessionInfo]:
+        """All sessions by name, fetched in pages; `timeout` is that of each page."""
+        token = ""
+        while True:
+            request = sessions_pb2.ListSessionsRequest(page_size=_PAGE_SIZE, page_token=token)
+            page = self._caller.unary(self._sessions.ListSessions, request, timeout, repeatable=True)
+            yield from map(info_from_proto, page.sessions)
+            token = page.next_page_token
+            if not token:
+                return
+
+    def delete_session(self, name: str, *, etag: str = "", timeout: float | None = None) -> int:
+        """Deletes a session: as `Session.delete`."""
+        return self.session(name).delete(etag=etag, timeout=timeout)
+
+
+def connect(target: str = DEFAULT_TARGET, *, timeout: float = DEFAULT_TIMEOUT_S, retries: int = 2) -> Client:
+    """Attaches to a daemon. Returns at once: the first call finds out whether one is there.
+
+    Parameters
+    ----------
+    target : str
+        "host:port" or "unix:/path".
+    timeout : float
+        Seconds that a call may take unless it says otherwise; ``float("inf")`` for no limit.
+    retries : int
+        How often reading calls, and edits by their request ids, are repeated when nobody answers.
+    """
+    return Client(target, timeout, retries)

@@ -1,0 +1,225 @@
+"""A local daemon that belongs to this process."""
+
+from __future__ import annotations
+
+import os
+import queue
+import shutil
+import subprocess
+import tempfile
+import threading
+import time
+import weakref
+from collections.abc import Sequence
+from pathlib import Path
+from types import TracebackType
+
+from .client import DEFAULT_TIMEOUT_S, Client, connect
+from .errors import LaunchError
+from .files import PathLike
+
+_POLL_S = 0.01
+_LOG_TAIL_LINES = 20
+_MAX_SOCKET_PATH = 100  # the kernel's limit is 107 bytes
+
+
+class Daemon:
+    """A running dynmeshd; made by `launch`. Closing it, or the end of this process, ends it.
+
+    Attributes
+    ----------
+    target : str
+        Its unix socket, for `connect`.
+    addresses : tuple of str
+        All addresses on which it serves.
+    """
+
+    def __init__(self, process: subprocess.Popen[bytes], directory: Path, grace_s: float) -> None:
+        self._process = process
+        self._directory = directory
+        self._client: Client | None = None
+        self.target = f"unix:{directory / 'socket'}"
+        self.addresses: tuple[str, ...] = ()
+        self._end = weakref.finalize(self, _end, process, directory, grace_s)
+
+    def __repr__(self) -> str:
+        return f"<dynmesh.Daemon pid={self.pid} {self.target}>"
+
+    @property
+    def pid(self) -> int:
+        """Process id."""
+        return self._process.pid
+
+    @property
+    def running(self) -> bool:
+        """Whether the process is alive."""
+        return self._process.poll() is None
+
+    @property
+    def client(self) -> Client:
+        """A client of this daemon, made when first asked for."""
+        if self._client is None:
+            self._client = self.connect()
+        return self._client
+
+    def connect(self, *, timeout: float = DEFAULT_TIMEOUT_S, retries: int = 2) -> Client:
+        """Another client of this daemon: as `dynmesh.connect`."""
+        return connect(self.target, timeout=timeout, retries=retries)
+
+    def log_tail(self, lines: int = _LOG_TAIL_LINES) -> str:
+        """The last lines of the daemon's log."""
+        log = self._directory / "log"
+        text = log.read_text(errors="replace") if log.exists() else ""
+        return "\n".join(text.splitlines()[-lines:])
+
+    def close(self) -> None:
+        """Ends the daemon: it may finish what it is doing, then it is killed. May be called again."""
+        if self._client is not None:
+            self._client.close()
+            self._client = None
+        self._end()
+
+    def __enter__(self) -> Daemon:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _wait_until_ready(self, ready_file: Path, timeout: float) -> None:
+        deadline = time.monotonic() + timeout
+        while not ready_file.exists():
+            if not self.running:
+                raise self._failure(f"dynmeshd ended with status {self._process.returncode}")
+            if time.monotonic() > deadline:
+                raise self._failure(f"dynmeshd was not ready within {timeout} s")
+            time.sleep(_POLL_S)
+        self.addresses = tuple(ready_file.read_text().split())
+
+    def _failure(self, what: str) -> LaunchError:
+        tail = self.log_tail()
+        return LaunchError(f"{what}; its log ends:\n{tail}" if tail else f"{what} and wrote no log")
+
+
+def launch(
+    binary: PathLike | None = None,
+    *,
+    listen: str | None = None,
+    flags: Sequence[str] = (),
+    timeout: float = 30.0,
+    grace: float = 10.0,
+) -> Daemon:
+    """Starts a dynmeshd of this process's own, on a unix socket in a private directory.
+
+    >>> with dynmesh.launch() as daemon:
+    ...     session = daemon.client.create_session("part")
+
+    Parameters
+    ----------
+    binary : path, optional
+        Default: the environment variable DYNMESHD, else the daemon of the build that this package belongs to,
+        else ``dynmeshd`` in PATH.
+    listen : str, optional
+        Serve at "host:port" as well; port 0 means any free one (see `Daemon.addresses`).
+    flags : sequence of str
+        Further flags of dynmeshd.
+    timeout : float
+        Seconds until it must serve.
+    grace : float
+        Seconds that it may take to end when closed.
+
+    Raises
+    ------
+    LaunchError
+        No binary, or it did not start; the message holds the end of its log.
+    """
+    command = find_daemon(binary)
+    directory = _private_directory()
+    ready_file = directory / "ready"
+    arguments = [
+        command,
+        f"--unix_socket={directory / 'socket'}",
+        f"--ready_file={ready_file}",
+        f"--listen={listen or ''}",
+        "--exit_with_parent",
+        *flags,
+    ]
+    daemon = Daemon(_start(arguments, directory), directory, grace)
+    try:
+        daemon._wait_until_ready(ready_file, timeout)
+    except BaseException:
+        daemon.close()
+        raise
+    return daemon
+
+
+def find_daemon(binary: PathLike | None = None) -> str:
+    """Path of dynmeshd, looked for as `launch` says. Raises `LaunchError`."""
+    for candidate in (binary, os.environ.get("DYNMESHD"), _built_daemon(), "dynmeshd"):
+        if candidate:
+            found = shutil.which(candidate)
+            if found:
+                return found
+            if candidate is binary:
+                break
+    raise LaunchError(
+        f"no dynmeshd at {binary}"
+        if binary
+        else "no dynmeshd: build it, or name it by the environment variable DYNMESHD, or put it into PATH",
+        reason="NO_DAEMON",
+    )
+
+
+def _built_daemon() -> str | None:
+    try:
+        from . import _build  # written by the build
+    except ImportError:
+        return None
+    return _build.DAEMON
+
+
+def _private_directory() -> Path:
+    directory = tempfile.mkdtemp(prefix="dynmesh-")
+    if len(directory) < _MAX_SOCKET_PATH - len("/socket"):
+        return Path(directory)
+    os.rmdir(directory)
+    return Path(tempfile.mkdtemp(prefix="dynmesh-", dir="/tmp"))
+
+
+def _start(arguments: Sequence[str], directory: Path) -> subprocess.Popen[bytes]:
+    """Starts the process from a thread that lives as long as it does.
+
+    The kernel tells a child of the end of the thread that made it, not of its process (prctl(2),
+    PR_SET_PDEATHSIG); so the thread that calls `launch` may end before the daemon.
+    """
+    started: queue.SimpleQueue[subprocess.Popen[bytes] | OSError] = queue.SimpleQueue()
+
+    def run() -> None:
+        try:
+            with open(directory / "log", "wb") as log:
+                process = subprocess.Popen(arguments, stdin=subprocess.DEVNULL, stdout=log, stderr=log)
+        except OSError as error:
+            started.put(error)
+        else:
+            started.put(process)
+            process.wait()
+
+    threading.Thread(target=run, name="dynmesh-daemon", daemon=True).start()
+    outcome = started.get()
+    if isinstance(outcome, OSError):
+        shutil.rmtree(directory, ignore_errors=True)
+        raise LaunchError(f"cannot start {arguments[0]}: {outcome}") from outcome
+    return outcome
+
+
+def _end(process: subprocess.Popen[bytes], directory: Path, grace_s: float) -> None:
+    """SIGTERM, and SIGKILL after `grace_s` seconds."""
+    if process.poll() is None:
+        process.terminate()
+        try:
+            process.wait(grace_s)
+        except subprocess.TimeoutExpired:
+            process.kill()
+    process.wait()
+    shutil.rmtree(directory, ignore_errors=True)

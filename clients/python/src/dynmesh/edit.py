@@ -1,0 +1,207 @@
+"""Batches of edits: collected in a ``with`` block, committed as one revision or not at all."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .arrays import Ids, as_id_rows, as_ids, as_points, concatenate, f64_bytes, from_bytes, u32_bytes
+from .checksum import Checksum
+from .columns import as_values, make_spec, values_bytes
+from .errors import InvalidArgumentError
+from .info import Counts, MeshWarning, checksum_from_proto, counts_from_proto, warning_from_proto
+from .kinds import KindLike, TypeLike, as_element_type, as_kind
+from .v1 import edits_pb2, types_pb2
+
+# In a batch, vertex id NEW_VERTEX | k is the k-th vertex that the batch adds.
+NEW_VERTEX = 0x80000000
+
+
+@dataclass(frozen=True)
+class EditResult:
+    """What a batch did or, if it was only validated, would have done.
+
+    Attributes
+    ----------
+    revision : int
+        After the batch; of ``validate_only`` the revision that it was checked against.
+    new_ids : tuple of uint32[n]
+        For each edit the ids of what it added, in order.
+    new_vertices : uint32[n]
+        Ids of all vertices that the batch added, in order.
+    """
+
+    revision: int
+    new_ids: tuple[Ids, ...]
+    new_vertices: Ids
+    checksum: Checksum
+    counts: Counts
+    warnings: tuple[MeshWarning, ...]
+
+    def resolve(self, vertices: ArrayLike) -> Ids:
+        """Vertex ids for handles that `EditBatch.add_vertices` gave out; ids stay as they are.
+
+        Parameters
+        ----------
+        vertices : uint32, any shape
+        """
+        ids = np.array(vertices, dtype=np.uint32)
+        handles = (ids & NEW_VERTEX) != 0
+        ids[handles] = self.new_vertices[ids[handles] & ~np.uint32(NEW_VERTEX)]
+        return ids
+
+
+class EditBatch:
+    """Collects edits in order. Nothing is sent; the methods check shapes and types only."""
+
+    def __init__(self) -> None:
+        self._edits: list[edits_pb2.Edit] = []
+        self._num_new_vertices = 0
+        self._adds_vertices: list[int] = []
+
+    def __len__(self) -> int:
+        return len(self._edits)
+
+    def add_vertices(self, positions: ArrayLike) -> Ids:
+        """Adds vertices.
+
+        Parameters
+        ----------
+        positions : float[n, 3]
+
+        Returns
+        -------
+        uint32[n]
+            Handles: they serve as vertex ids in later edits of this batch. `EditResult.resolve` turns
+            them into ids.
+        """
+        points = as_points(positions)
+        first = NEW_VERTEX + self._num_new_vertices
+        self._adds_vertices.append(len(self._edits))
+        self._num_new_vertices += len(points)
+        self._append(add_vertices=edits_pb2.AddVertices(positions=f64_bytes(points)))
+        return np.arange(first, first + len(points), dtype=np.uint32)
+
+    def remove_vertices(self, ids: ArrayLike) -> int:
+        """Removes vertices (uint32[n]) that have no incident edges any more; returns the edit's index."""
+        return self._append(remove_vertices=edits_pb2.RemoveVertices(ids=u32_bytes(as_ids(ids))))
+
+    def move_vertices(self, ids: ArrayLike, positions: ArrayLike) -> int:
+        """Moves vertices (uint32[n]) to positions (float[n, 3]); returns the edit's index."""
+        slots, points = as_ids(ids), as_points(positions)
+        _check_same_length("positions", len(points), len(slots))
+        move = edits_pb2.MoveVertices(ids=u32_bytes(slots), positions=f64_bytes(points))
+        return self._append(move_vertices=move)
+
+    def add_elements(self, element_type: TypeLike, vertices: ArrayLike) -> int:
+        """Adds elements of one type.
+
+        Parameters
+        ----------
+        element_type : ElementType or str
+            By meshio's name ("tetra") or ours ("tetrahedron").
+        vertices : uint32[n, k]
+            Vertex ids or handles, in VTK's order.
+
+        Returns
+        -------
+        int
+            The edit's index: ``tx.result.new_ids[index]`` are the ids of the elements.
+        """
+        of_type = as_element_type(element_type)
+        rows = as_id_rows(vertices, of_type.num_vertices, f"vertices of {of_type} elements")
+        block = types_pb2.ElementBlock(type=int(of_type), vertices=u32_bytes(rows))
+        return self._append(add_elements=block)
+
+    def remove_elements(self, kind: KindLike, ids: ArrayLike) -> int:
+        """Removes elements (uint32[n]) of a kind; faces and edges that only they needed go with them, vertices
+        stay. Returns the edit's index."""
+        remove = edits_pb2.RemoveElements(kind=int(as_kind(kind)), ids=u32_bytes(as_ids(ids)))
+        return self._append(remove_elements=remove)
+
+    def add_attribute(self, name: str, kind: KindLike, dtype: Any = np.float64, components: int = 1) -> int:
+        """Adds a column of zeros, float64 or int32, for all entities of a kind. Returns the edit's index."""
+        return self._append(add_attribute=make_spec(name, as_kind(kind), dtype, components))
+
+    def set_attribute(self, name: str, kind: KindLike, ids: ArrayLike, values: ArrayLike) -> int:
+        """Sets rows of an attribute; returns the edit's index.
+
+        Parameters
+        ----------
+        ids : uint32[n]
+        values : float[n], int[n], float[n, components] or int[n, components]
+            Must have the column's type: float64 (single precision is widened) or int32.
+        """
+        slots, rows = as_ids(ids), as_values(values, name)
+        _check_same_length("values", len(rows), len(slots))
+        spec = make_spec(name, as_kind(kind), rows.dtype, rows.shape[1])
+        message = types_pb2.AttributeValues(spec=spec, ids=u32_bytes(slots), values=values_bytes(rows))
+        return self._append(set_attribute=message)
+
+    def edits(self) -> list[edits_pb2.Edit]:
+        """The edits so far, as messages."""
+        return list(self._edits)
+
+    def read(self, reply: edits_pb2.ApplyEditsResponse) -> EditResult:
+        """The server's answer to this batch."""
+        new_ids = tuple(from_bytes(result.new_ids, "<u4") for result in reply.results)
+        return EditResult(
+            revision=reply.revision,
+            new_ids=new_ids,
+            new_vertices=concatenate([new_ids[i] for i in self._adds_vertices], np.uint32),
+            checksum=checksum_from_proto(reply.checksum),
+            counts=counts_from_proto(reply.counts),
+            warnings=tuple(warning_from_proto(w) for w in reply.warnings),
+        )
+
+    def _append(self, **kind: Any) -> int:
+        self._edits.append(edits_pb2.Edit(**kind))
+        return len(self._edits) - 1
+
+
+class Transaction(EditBatch):
+    """A batch that is sent when its ``with`` block ends, and forgotten if an exception ends it.
+
+    >>> with session.edit() as tx:
+    ...     v = tx.add_vertices(points)
+    ...     tets = tx.add_elements("tetra", [v[:4]])
+    >>> tx.result.revision, tx.result.resolve(v), tx.result.new_ids[tets]
+
+    Attributes
+    ----------
+    result : EditResult
+        Set when the batch was accepted. RuntimeError before.
+    """
+
+    def __init__(self, commit: Callable[[EditBatch], EditResult]) -> None:
+        super().__init__()
+        self._commit = commit
+        self._result: EditResult | None = None
+
+    @property
+    def result(self) -> EditResult:
+        """What the batch did. Raises RuntimeError while it has not been accepted."""
+        if self._result is None:
+            raise RuntimeError(
+                "the batch has not been committed: its with block has not ended without an error"
+            )
+        return self._result
+
+    def __enter__(self) -> Transaction:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if kind is None:
+            self._result = self._commit(self)
+
+
+def _check_same_length(what: str, length: int, wanted: int) -> None:
+    if length != wanted:
+        raise InvalidArgumentError(f"{length} {what} for {wanted} ids", reason="BAD_ARRAY_LENGTH")

@@ -1,0 +1,160 @@
+"""What the server says of a session, as values."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime, timezone
+from typing import Any, NamedTuple
+
+from .arrays import Ids, Points, from_bytes
+from .checksum import Checksum
+from .kinds import EntityKind
+from .v1 import sessions_pb2, types_pb2
+
+_TYPE_NAMES = {types_pb2.ATTRIBUTE_TYPE_FLOAT64: "float64", types_pb2.ATTRIBUTE_TYPE_INT32: "int32"}
+
+
+class Counts(NamedTuple):
+    """Number of live entities of each kind."""
+
+    vertices: int
+    edges: int
+    faces: int
+    cells: int
+
+
+class AttributeSpec(NamedTuple):
+    """What a column of values is."""
+
+    name: str
+    kind: EntityKind
+    dtype: str  # "float64" or "int32"
+    components: int
+
+
+@dataclass(frozen=True)
+class MeshWarning:
+    """Something that was accepted but deserves a look.
+
+    Attributes
+    ----------
+    reason : str
+        "DEGENERATE_ELEMENT", "DUPLICATE_ELEMENT", ...
+    kind : EntityKind
+    ids : uint32[n]
+        The first entities that it concerns, at most 1024.
+    count : int
+        How many it concerns in all.
+    """
+
+    reason: str
+    message: str
+    kind: EntityKind
+    ids: Ids
+    count: int
+
+    def __str__(self) -> str:
+        return f"{self.message} [{self.reason}] ({self.count} {self.kind}(s))"
+
+
+@dataclass(frozen=True)
+class SessionInfo:
+    """What a session is and held at `revision`.
+
+    Attributes
+    ----------
+    counts, estimated_counts, boundary_counts, element_counts : Counts
+        Live entities; what Euler's formula estimates for them; those on the boundary; those that users
+        inserted (wire edges, dangling faces, cells).
+    euler_characteristic : int
+        V - E + F - C.
+    bounds : float64[2, 3] or None
+        Smallest and largest coordinates; None without vertices.
+    """
+
+    name: str
+    revision: int
+    etag: str
+    duplicates: str  # "keep" or "refuse"
+    create_time: datetime
+    update_time: datetime
+    counts: Counts
+    estimated_counts: Counts
+    boundary_counts: Counts
+    element_counts: Counts
+    euler_characteristic: int
+    checksum: Checksum
+    memory_bytes: int
+    followers: int
+    attributes: tuple[AttributeSpec, ...]
+    bounds: Points | None
+
+    def to_dict(self) -> dict[str, Any]:
+        """The same in the types of JSON; checksums are hexadecimal strings."""
+        return {
+            "name": self.name,
+            "revision": self.revision,
+            "etag": self.etag,
+            "duplicates": self.duplicates,
+            "create_time": self.create_time.isoformat(),
+            "update_time": self.update_time.isoformat(),
+            "counts": self.counts._asdict(),
+            "estimated_counts": self.estimated_counts._asdict(),
+            "boundary_counts": self.boundary_counts._asdict(),
+            "element_counts": self.element_counts._asdict(),
+            "euler_characteristic": self.euler_characteristic,
+            "checksum": str(self.checksum),
+            "memory_bytes": self.memory_bytes,
+            "followers": self.followers,
+            "attributes": [{**spec._asdict(), "kind": str(spec.kind)} for spec in self.attributes],
+            "bounds": None if self.bounds is None else self.bounds.tolist(),
+        }
+
+
+def counts_from_proto(message: types_pb2.EntityCounts) -> Counts:
+    """EntityCounts as `Counts`."""
+    return Counts(message.vertices, message.edges, message.faces, message.cells)
+
+
+def checksum_from_proto(message: types_pb2.Checksum) -> Checksum:
+    """Checksum message as `Checksum`."""
+    return Checksum(message.topology, message.geometry)
+
+
+def warning_from_proto(message: types_pb2.Warning) -> MeshWarning:
+    """Warning message as `MeshWarning`."""
+    kind = EntityKind(message.kind or EntityKind.CELL)
+    return MeshWarning(message.reason, message.message, kind, from_bytes(message.ids, "<u4"), message.count)
+
+
+def info_from_proto(message: sessions_pb2.Session) -> SessionInfo:
+    """Session message as `SessionInfo`."""
+    refuses = message.settings.duplicate_policy == sessions_pb2.DUPLICATE_POLICY_REFUSE
+    return SessionInfo(
+        name=message.name,
+        revision=message.revision,
+        etag=message.etag,
+        duplicates="refuse" if refuses else "keep",
+        create_time=message.create_time.ToDatetime(timezone.utc),
+        update_time=message.update_time.ToDatetime(timezone.utc),
+        counts=counts_from_proto(message.counts),
+        estimated_counts=counts_from_proto(message.estimated_counts),
+        boundary_counts=counts_from_proto(message.boundary_counts),
+        element_counts=counts_from_proto(message.element_counts),
+        euler_characteristic=message.euler_characteristic,
+        checksum=checksum_from_proto(message.checksum),
+        memory_bytes=message.memory_bytes,
+        followers=message.followers,
+        attributes=tuple(_spec_from_proto(spec) for spec in message.attributes),
+        bounds=_bounds(message),
+    )
+
+
+def _spec_from_proto(spec: types_pb2.AttributeSpec) -> AttributeSpec:
+    return AttributeSpec(spec.name, EntityKind(spec.kind), _TYPE_NAMES[spec.type], spec.components or 1)
+
+
+def _bounds(message: sessions_pb2.Session) -> Points | None:
+    if not message.bounds_low:
+        return None
+    return from_bytes(message.bounds_low + message.bounds_high, "<f8").reshape(2, 3)

@@ -1,0 +1,232 @@
+"""One named session: reading, editing, following, importing and exporting it."""
+
+from __future__ import annotations
+
+import uuid
+from collections.abc import Callable, Collection
+from typing import TYPE_CHECKING
+
+import grpc
+from numpy.typing import ArrayLike
+
+from ._calls import Caller
+from .delta import HAS_NATIVE
+from .edit import EditBatch, EditResult, Transaction
+from .edit_stream import EditStream
+from .errors import InvalidArgumentError, UnimplementedError
+from .files import PathLike, read_mesh
+from .meshes import Cells, as_mesh_data
+from .mirror import Mirror, Update
+from .mirror_state import MirrorState
+from .progress import Progress
+from .session_reader import FOREVER, SessionReader
+from .transfer import ImportResult, import_requests, read_import
+from .v1 import edits_pb2, edits_pb2_grpc, sessions_pb2, subscriptions_pb2, subscriptions_pb2_grpc
+
+if TYPE_CHECKING:
+    import meshio
+
+_CODECS = {
+    "auto": subscriptions_pb2.DELTA_CODEC_UNSPECIFIED,
+    "raw": subscriptions_pb2.DELTA_CODEC_RAW,
+    "zstd": subscriptions_pb2.DELTA_CODEC_ZSTD,
+    "draco": subscriptions_pb2.DELTA_CODEC_DRACO,
+}
+
+
+class Session(SessionReader):
+    """A session by its name; made by `Client.session` and `Client.create_session`.
+
+    Costs nothing to make and holds nothing of the mesh: each method is a call. ``timeout`` is in seconds;
+    None means the client's. Errors are `DynmeshError`, first of all `NotFoundError` when the session is gone.
+    Thread safety: everything may be called from any thread.
+    """
+
+    def __init__(self, name: str, channel: grpc.Channel, caller: Caller) -> None:
+        super().__init__(name, channel, caller)
+        self._edits = edits_pb2_grpc.EditServiceStub(channel)
+        self._subscriptions = subscriptions_pb2_grpc.SubscriptionServiceStub(channel)
+
+    def __repr__(self) -> str:
+        return f"<dynmesh.Session {self.name!r}>"
+
+    def validate(self, *, timeout: float | None = None) -> list[str]:
+        """Broken invariants of the server's data structure; empty when it is sound. Slow: a tool for tests."""
+        request = sessions_pb2.ValidateSessionRequest(session=self.name)
+        reply = self._caller.unary(self._sessions.ValidateSession, request, timeout, repeatable=True)
+        return list(reply.violations)
+
+    def delete(self, *, etag: str = "", timeout: float | None = None) -> int:
+        """Deletes the session and ends its mirrors; returns its last revision.
+
+        With `etag` (`SessionInfo.etag`) only if it has not changed since: else `AbortedError`.
+        """
+        request = sessions_pb2.DeleteSessionRequest(name=self.name, etag=etag)
+        return self._caller.unary(self._sessions.DeleteSession, request, timeout, repeatable=False).revision
+
+    # ---- Writing ----
+
+    def import_mesh(
+        self,
+        mesh: meshio.Mesh | PathLike | ArrayLike,
+        cells: Cells | None = None,
+        *,
+        attributes: Collection[str] | None = None,
+        validate_only: bool = False,
+        progress: bool | None = None,
+        timeout: float | None = None,
+    ) -> ImportResult:
+        """Fills this empty session with a mesh, as revision 1.
+
+        Vertex i gets id i; element i of all blocks of a kind gets id i of that kind. Nothing is merged,
+        reordered or repaired. Nobody sees anything before the result.
+
+        Parameters
+        ----------
+        mesh : meshio.Mesh, file name, or float[n, 3]
+            See `dynmesh.meshes.from_meshio` for what becomes of a mesh's data; with an array, `cells` holds
+            the elements.
+        cells : mapping or iterable of (type, int[m, k]), optional
+        attributes : collection of str, optional
+            Names of the point and cell data to take. Default: all.
+        validate_only : bool
+            Everything is checked and the result computed, but the session stays empty.
+        timeout : float, optional
+            Default: none, as it takes as long as it takes.
+
+        Raises
+        ------
+        FailedPreconditionError
+            SESSION_NOT_EMPTY.
+        InvalidArgumentError
+            ``metadata["index"]`` is the position in the mesh.
+        """
+        if isinstance(mesh, (str, bytes)) or hasattr(mesh, "__fspath__"):
+            mesh = read_mesh(mesh)  # type: ignore[arg-type]
+        data = as_mesh_data(mesh, cells, attributes)
+        requests = import_requests(self.name, data, validate_only, _new_request_id())
+        with Progress("importing", progress) as bar:
+            return read_import(
+                self._caller.stream(
+                    self._sessions.ImportMesh, requests, FOREVER if timeout is None else timeout
+                ),
+                bar,
+            )
+
+    def edit(
+        self,
+        *,
+        as_of_revision: int = 0,
+        if_revision: int | None = None,
+        request_id: str | None = None,
+        validate_only: bool = False,
+        timeout: float | None = None,
+    ) -> Transaction:
+        """A batch of edits, sent as one revision when its ``with`` block ends without an exception.
+
+        The server limits its size: 4 MiB unless told otherwise, which is some 200,000 tetrahedra.
+
+        Parameters
+        ----------
+        as_of_revision : int
+            As in `neighbors`.
+        if_revision : int, optional
+            Refused with `AbortedError` REVISION_MISMATCH unless the session is at this revision.
+        request_id : str, optional
+            A retry with the same id and content gets the first answer. Default: a new one, so that the
+            client itself may repeat the call when the connection breaks.
+        validate_only : bool
+            Check, and compute the result, but change nothing.
+        """
+        options = {
+            "as_of_revision": as_of_revision,
+            "if_revision": if_revision,
+            "request_id": request_id,
+            "validate_only": validate_only,
+        }
+        return Transaction(lambda batch: self.apply(batch, timeout=timeout, **options))  # type: ignore[arg-type]
+
+    def apply(
+        self,
+        batch: EditBatch,
+        *,
+        as_of_revision: int = 0,
+        if_revision: int | None = None,
+        request_id: str | None = None,
+        validate_only: bool = False,
+        timeout: float | None = None,
+    ) -> EditResult:
+        """Sends a batch that was collected without a ``with`` block. Parameters as in `edit`."""
+        request = edits_pb2.ApplyEditsRequest(
+            session=self.name,
+            edits=batch.edits(),
+            as_of_revision=as_of_revision,
+            if_revision=if_revision,
+            request_id=request_id or _new_request_id(),
+            validate_only=validate_only,
+        )
+        return batch.read(self._caller.unary(self._edits.ApplyEdits, request, timeout, repeatable=True))
+
+    def edit_stream(self, *, as_of_revision: int = 0, window: int = 64) -> EditStream:
+        """Pipelined edits: up to `window` batches are on their way at once."""
+
+        def make_request(batch: EditBatch) -> edits_pb2.ApplyEditsRequest:
+            return edits_pb2.ApplyEditsRequest(
+                session=self.name,
+                edits=batch.edits(),
+                as_of_revision=as_of_revision,
+                request_id=_new_request_id(),
+            )
+
+        return EditStream(self._edits.StreamEdits, make_request, window)
+
+    # ---- Following ----
+
+    def mirror(
+        self,
+        *,
+        codec: str = "auto",
+        position_bits: int = 0,
+        min_interval: float = 0.0,
+        from_mirror: Mirror | None = None,
+        on_delta: Callable[[Update], None] | None = None,
+    ) -> Mirror:
+        """A live copy that follows this session until it is closed. Returns at once: see `Mirror.wait`.
+
+        Parameters
+        ----------
+        codec : "auto", "draco", "zstd" or "raw"
+            How deltas are packed; "auto": whatever is smallest. Without dynmesh's native module only "raw" can be
+            decoded, and is what "auto" means.
+        position_bits : int
+            0: positions are exact. 1-30: on a grid of that many bits for each axis; such a mirror proves its
+            topology only.
+        min_interval : float
+            At least so many seconds between updates.
+        from_mirror : Mirror, optional
+            Goes on from a copy of what that mirror has.
+        on_delta : callable, optional
+            Called with each `Update` in the mirror's thread.
+        """
+        request = subscriptions_pb2.SubscribeRequest(
+            session=self.name,
+            codec=_codec(codec),
+            position_bits=position_bits,
+            min_interval_ms=round(min_interval * 1000),
+        )
+        state = from_mirror.state() if from_mirror else MirrorState()
+        return Mirror(self._subscriptions.Subscribe, request, state, on_delta)
+
+
+def _new_request_id() -> str:
+    return uuid.uuid4().hex
+
+
+def _codec(name: str) -> int:
+    if name not in _CODECS:
+        raise InvalidArgumentError(f"a codec is one of {', '.join(_CODECS)}, not {name!r}")
+    if HAS_NATIVE or name == "raw":
+        return _CODECS[name]
+    if name == "auto":
+        return _CODECS["raw"]
+    raise UnimplementedError(f"codec {name} needs dynmesh's native module", reason="NO_NATIVE_MODULE")

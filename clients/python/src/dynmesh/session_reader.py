@@ -1,0 +1,162 @@
+"""The reading half of a session: what it is, neighbourhoods, entities, boundary, and all of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import chain
+from typing import TYPE_CHECKING, Any
+
+import grpc
+
+from ._calls import Caller
+from .arrays import Ids, Points
+from .files import PathLike
+from .info import Counts, SessionInfo, info_from_proto
+from .kinds import KindLike, as_kind
+from .progress import Progress
+from .queries import (
+    Csr,
+    Entities,
+    Selection,
+    Surface,
+    read_boundary,
+    read_entities,
+    read_neighbors,
+    read_surface,
+    selections_of,
+)
+from .snapshot import Snapshot
+from .transfer import ExportReader
+from .v1 import queries_pb2, queries_pb2_grpc, sessions_pb2, sessions_pb2_grpc, types_pb2
+
+if TYPE_CHECKING:
+    import meshio
+
+# Transfers of whole meshes take as long as they take.
+FOREVER = float("inf")
+
+
+class SessionReader:
+    """Reads one session. Every method is one call, and every answer speaks of one revision."""
+
+    def __init__(self, name: str, channel: grpc.Channel, caller: Caller) -> None:
+        self.name = name
+        self._caller = caller
+        self._sessions = sessions_pb2_grpc.SessionServiceStub(channel)
+        self._queries = queries_pb2_grpc.QueryServiceStub(channel)
+
+    def info(self, *, timeout: float | None = None) -> SessionInfo:
+        """What the session is and holds now."""
+        request = sessions_pb2.GetSessionRequest(name=self.name)
+        reply = self._caller.unary(self._sessions.GetSession, request, timeout, repeatable=True)
+        return info_from_proto(reply.session)
+
+    @property
+    def revision(self) -> int:
+        """Number of committed batches. One call."""
+        return self.info().revision
+
+    @property
+    def counts(self) -> Counts:
+        """Live entities of each kind. One call."""
+        return self.info().counts
+
+    def neighbors(
+        self,
+        from_kind: KindLike,
+        to_kind: KindLike,
+        ids: Selection = None,
+        *,
+        as_of_revision: int = 0,
+        timeout: float | None = None,
+    ) -> Csr:
+        """One of the 16 neighbour relations for many entities.
+
+        The same kind twice means adjacent: vertices through an edge, edges through a vertex, faces through an
+        edge, cells through a face. Lower dimension asked of higher comes in template order, everything else
+        ascending.
+
+        Parameters
+        ----------
+        from_kind, to_kind : "vertex", "edge", "face" or "cell"
+        ids : uint32[n], slice or None
+            Entities of `from_kind`; a slice means all live ones in that range, None all live ones.
+        as_of_revision : int
+            The revision at which `ids` were read: an id whose occupant was born later is refused with
+            `NotFoundError` ENTITY_REMOVED. 0: the current one.
+        """
+        origin, target = int(as_kind(from_kind)), int(as_kind(to_kind))
+        requests = [
+            queries_pb2.GetNeighborsRequest(
+                **{"from": origin}, to=target, **self._selected(part, as_of_revision)
+            )
+            for part in selections_of(ids)
+        ]
+        return read_neighbors(self._replies(self._queries.GetNeighbors, requests, timeout))
+
+    def entities(
+        self, kind: KindLike, ids: Selection = None, *, as_of_revision: int = 0, timeout: float | None = None
+    ) -> Entities:
+        """Vertices, types and flags of entities; positions of vertices. Parameters as in `neighbors`."""
+        of_kind = as_kind(kind)
+        requests = [
+            queries_pb2.GetEntitiesRequest(kind=int(of_kind), **self._selected(part, as_of_revision))
+            for part in selections_of(ids)
+        ]
+        return read_entities(of_kind, self._replies(self._queries.GetEntities, requests, timeout))
+
+    def positions(
+        self, ids: Selection = None, *, as_of_revision: int = 0, timeout: float | None = None
+    ) -> Points:
+        """Positions of vertices: float64[n, 3], in order of `ids`."""
+        return self.entities("vertex", ids, as_of_revision=as_of_revision, timeout=timeout).positions
+
+    def boundary(self, kind: KindLike, *, timeout: float | None = None) -> Ids:
+        """Ids of the entities on the boundary, uint32[n], ascending.
+
+        Faces: with exactly one cell. Edges: of those, and with exactly one face. Vertices: of those.
+        """
+        request = queries_pb2.GetBoundaryRequest(session=self.name, kind=int(as_kind(kind)))
+        return read_boundary(self._caller.stream(self._queries.GetBoundary, request, timeout))[0]
+
+    def boundary_surface(self, position_bits: int = 14, *, timeout: float | None = None) -> Surface:
+        """The boundary for viewers, as a Draco mesh with `position_bits` (1-30) for each axis."""
+        request = queries_pb2.GetBoundarySurfaceRequest(session=self.name, position_bits=position_bits)
+        return read_surface(self._caller.stream(self._queries.GetBoundarySurface, request, timeout))
+
+    def snapshot(self, *, progress: bool | None = None, timeout: float | None = None) -> Snapshot:
+        """Everything at one revision. `progress`: whether to show a bar; default: on a terminal."""
+        reader = ExportReader()
+        request = sessions_pb2.ExportMeshRequest(session=self.name)
+        with Progress("exporting", progress) as bar:
+            for reply in self._caller.stream(
+                self._sessions.ExportMesh, request, FOREVER if timeout is None else timeout
+            ):
+                bar.add(reader.add(reply))
+        return reader.snapshot()
+
+    def to_meshio(
+        self, *, slots: bool = True, progress: bool | None = None, timeout: float | None = None
+    ) -> meshio.Mesh:
+        """Everything at one revision, for meshio: see `Snapshot.to_meshio`."""
+        return self.snapshot(progress=progress, timeout=timeout).to_meshio(slots=slots)
+
+    def export(
+        self,
+        path: PathLike,
+        file_format: str | None = None,
+        *,
+        slots: bool = True,
+        progress: bool | None = None,
+        timeout: float | None = None,
+    ) -> Snapshot:
+        """Writes everything to a file in whatever format meshio knows by its name; returns what was written."""
+        snapshot = self.snapshot(progress=progress, timeout=timeout)
+        snapshot.write(path, file_format, slots=slots)
+        return snapshot
+
+    def _selected(self, selection: types_pb2.Selection, as_of_revision: int) -> dict[str, Any]:
+        return {"session": self.name, "selection": selection, "as_of_revision": as_of_revision}
+
+    def _replies(self, method: Any, requests: list[Any], timeout: float | None) -> Iterator[Any]:
+        return chain.from_iterable(self._caller.stream(method, request, timeout) for request in requests)

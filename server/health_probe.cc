@@ -1,0 +1,52 @@
+#include "server/health_probe.h"
+
+#include <memory>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "absl/synchronization/notification.h"
+#include "absl/time/clock.h"
+#include "grpcpp/create_channel.h"
+#include "grpcpp/generic/generic_stub.h"
+#include "grpcpp/security/credentials.h"
+
+namespace dynmesh {
+namespace {
+
+constexpr char kMethod[] = "/grpc.health.v1.Health/Check";
+// HealthCheckResponse with its only field, status = 1, set to SERVING = 1. The proto is in no Debian package, and
+// for one number none is needed.
+constexpr char kServing[] = "\x08\x01";
+
+std::string ToString(const grpc::ByteBuffer& buffer) {
+  std::vector<grpc::Slice> slices;
+  if (!buffer.Valid() || !buffer.Dump(&slices).ok()) return "";
+  std::string bytes;
+  for (const grpc::Slice& slice : slices) {
+    bytes.append(reinterpret_cast<const char*>(slice.begin()), slice.size());
+  }
+  return bytes;
+}
+
+}  // namespace
+
+absl::Status ProbeHealth(const std::string& target, absl::Duration timeout) {
+  grpc::GenericStub stub(grpc::CreateChannel(target, grpc::InsecureChannelCredentials()));
+  grpc::ClientContext context;
+  context.set_deadline(absl::ToChronoTime(absl::Now() + timeout));
+  const grpc::Slice empty;
+  const grpc::ByteBuffer request(&empty, 1);
+  grpc::ByteBuffer response;
+  grpc::Status status;
+  absl::Notification done;
+  stub.UnaryCall(&context, kMethod, grpc::StubOptions(), &request, &response, [&](grpc::Status result) {
+    status = std::move(result);
+    done.Notify();
+  });
+  done.WaitForNotification();
+  if (!status.ok()) return absl::UnavailableError(absl::StrCat(target, ": ", status.error_message()));
+  if (ToString(response) == kServing) return absl::OkStatus();
+  return absl::UnavailableError(absl::StrCat(target, " is not serving"));
+}
+
+}  // namespace dynmesh

@@ -1,0 +1,132 @@
+#include "server/rpc/import_reactor.h"
+
+#include <utility>
+
+#include "core/mesh/error.h"
+#include "server/rpc/convert_sessions.h"
+#include "server/rpc/status.h"
+#include "server/rpc/unary.h"
+#include "server/session/catch_exceptions.h"
+
+namespace dynmesh {
+namespace {
+
+constexpr char kRpc[] = "ImportMesh";
+constexpr char kReceiving[] = "receiving";
+constexpr char kBuilding[] = "building";
+constexpr uint64_t kItemsPerReport = 100'000;
+
+}  // namespace
+
+ImportReactor* ImportReactor::Start() {
+  StartRead(&request_);
+  return this;
+}
+
+void ImportReactor::OnReadDone(bool ok) {
+  if (ok) return Post(services_.quick(), &ImportReactor::StageAndReadNext);
+  if (importer_ == nullptr) {
+    return EndWith(cancelled_ ? CallCancelled() : BadField("header", "an import begins with a header"));
+  }
+  Announce();
+}
+
+void ImportReactor::Post(Executor& executor, void (ImportReactor::*step)()) {
+  const absl::Status posted = executor.TryPost([this, step] { (this->*step)(); });
+  if (!posted.ok()) EndWith(posted);
+}
+
+void ImportReactor::StageAndReadNext() {
+  const absl::Status staged = cancelled_ ? CallCancelled() : CatchExceptions([this] { return Stage(); });
+  if (!staged.ok()) {
+    importer_ = nullptr;
+    return EndWith(staged);
+  }
+  if (importer_->num_received() >= next_report_) {
+    next_report_ = importer_->num_received() + kItemsPerReport;
+    WriteProgress(kReceiving, importer_->num_received(), importer_->num_announced());
+  }
+  StartRead(&request_);
+}
+
+absl::Status ImportReactor::Stage() {
+  DYNMESH_RETURN_IF_ERROR(CheckMessageSize(request_, services_.limits()));
+  if (importer_ != nullptr) return StagePart(&request_, importer_->staged());
+  if (!request_.has_header()) return BadField("header", "an import begins with a header");
+  return BeginImport(request_.header());
+}
+
+absl::Status ImportReactor::BeginImport(const v1::ImportHeader& header) {
+  DYNMESH_ASSIGN_OR_RETURN(SessionPtr session, services_.registry.Find(header.session()));
+  DYNMESH_ASSIGN_OR_RETURN(importer_, Importer::Start(std::move(session), services_.registry.import_gate(),
+                                                      ToImportOptions(header)));
+  return absl::OkStatus();
+}
+
+void ImportReactor::Announce() {
+  {
+    absl::MutexLock lock(&mu_);
+    phase_ = Phase::kAnnouncing;
+    if (writing_) return;  // OnWriteDone comes back here
+  }
+  WriteProgress(kBuilding, 0, importer_->num_received());
+}
+
+void ImportReactor::OnWriteDone(bool ok) {
+  Phase phase;
+  absl::Status end;
+  {
+    absl::MutexLock lock(&mu_);
+    writing_ = false;
+    phase = phase_;
+    end = end_;
+    if (phase == Phase::kAnnouncing && progress_.progress().phase() == kBuilding) phase_ = Phase::kBuilding;
+  }
+  if (!ok) cancelled_ = true;
+  if (phase == Phase::kFinishing) return EndWith(end);
+  if (phase != Phase::kAnnouncing) return;
+  if (!ok) return EndWith(CallCancelled());
+  if (progress_.progress().phase() != kBuilding) return Announce();
+  Post(services_.heavy(), &ImportReactor::Build);
+}
+
+void ImportReactor::Build() {
+  const absl::Status built = CatchExceptions([this]() -> absl::Status {
+    DYNMESH_ASSIGN_OR_RETURN(const std::shared_ptr<const ImportOutcome> outcome, importer_->Finish(*this));
+    FromImportOutcome(*outcome, result_.mutable_result());
+    return absl::OkStatus();
+  });
+  importer_ = nullptr;  // leaves the gate before the peer knows that it may come again
+  EndWith(built);
+}
+
+void ImportReactor::OnProgress(uint64_t done, uint64_t total) { WriteProgress(kBuilding, done, total); }
+
+void ImportReactor::WriteProgress(const char* phase, uint64_t done, uint64_t total) {
+  {
+    absl::MutexLock lock(&mu_);
+    if (writing_ || phase_ == Phase::kFinishing) return;
+    writing_ = true;
+    v1::ImportProgress* progress = progress_.mutable_progress();
+    progress->set_phase(phase);
+    progress->set_done(done);
+    progress->set_total(total);
+  }
+  StartWrite(&progress_);
+}
+
+void ImportReactor::EndWith(const absl::Status& status) {
+  {
+    absl::MutexLock lock(&mu_);
+    phase_ = Phase::kFinishing;
+    end_ = status;
+    if (writing_) return;  // OnWriteDone comes back here
+  }
+  if (status.ok()) {
+    StartWriteAndFinish(&result_, grpc::WriteOptions(), grpc::Status::OK);
+  } else {
+    Finish(LoggedStatus(kRpc, status));
+  }
+}
+
+}  // namespace dynmesh

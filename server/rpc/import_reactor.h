@@ -1,0 +1,71 @@
+#ifndef DYNMESH_SERVER_RPC_IMPORT_REACTOR_H_
+#define DYNMESH_SERVER_RPC_IMPORT_REACTOR_H_
+
+#include <atomic>
+#include <memory>
+#include <string>
+
+#include "absl/base/thread_annotations.h"
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/synchronization/mutex.h"
+#include "dynmesh/v1/sessions.pb.h"
+#include "grpcpp/support/server_callback.h"
+#include "server/rpc/service_context.h"
+#include "server/session/importer/importer.h"
+
+namespace dynmesh {
+
+/// One ImportMesh call.
+///
+///     read ──> stage (quick executor) ──> read ... ──> half-closed ──> announce "building"
+///          ──> build (heavy executor) ──> result
+///
+/// The announcement has to be written before the build begins: a read that ends looks the same whether the
+/// peer is done or gone, but to one who is gone nothing can be written. So a cut stream is never taken for a
+/// short mesh. Progress is written when no write is in flight, and left out else. Deletes itself.
+class ImportReactor final : public grpc::ServerBidiReactor<v1::ImportMeshRequest, v1::ImportMeshResponse>,
+                            public ImportMonitor {
+ public:
+  explicit ImportReactor(const ServiceContext& services) : services_(services) {}
+
+  ImportReactor* Start();
+
+  void OnReadDone(bool ok) override;
+  void OnWriteDone(bool ok) override;
+  void OnCancel() override { cancelled_ = true; }
+  void OnDone() override { delete this; }
+
+  void OnProgress(uint64_t done, uint64_t total) override;
+  bool cancelled() override { return cancelled_; }
+
+ private:
+  enum class Phase { kReceiving, kAnnouncing, kBuilding, kFinishing };
+
+  absl::Status Stage();
+  absl::Status BeginImport(const v1::ImportHeader& header);
+  void StageAndReadNext();
+  void Announce();
+  void Build();
+  void WriteProgress(const char* phase, uint64_t done, uint64_t total) ABSL_LOCKS_EXCLUDED(mu_);
+  /// Ends the call, after the write that is in flight. Called once.
+  void EndWith(const absl::Status& status) ABSL_LOCKS_EXCLUDED(mu_);
+  void Post(Executor& executor, void (ImportReactor::*step)());
+
+  const ServiceContext services_;
+  std::atomic<bool> cancelled_{false};
+  std::unique_ptr<Importer> importer_;
+  uint64_t next_report_ = 0;  ///< items received at which progress is due
+  v1::ImportMeshRequest request_;
+  v1::ImportMeshResponse progress_;
+  v1::ImportMeshResponse result_;
+
+  absl::Mutex mu_;
+  Phase phase_ ABSL_GUARDED_BY(mu_) = Phase::kReceiving;
+  bool writing_ ABSL_GUARDED_BY(mu_) = false;
+  absl::Status end_ ABSL_GUARDED_BY(mu_);
+};
+
+}  // namespace dynmesh
+
+#endif  // DYNMESH_SERVER_RPC_IMPORT_REACTOR_H_

@@ -1,0 +1,180 @@
+#include "server/rpc/queries_service.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "core/mesh/error.h"
+#include "dynmesh/v1/queries.grpc.pb.h"
+#include "server/rpc/chunk_stream.h"
+#include "server/rpc/convert.h"
+#include "server/rpc/convert_queries.h"
+#include "server/rpc/unary.h"
+#include "server/session/queries.h"
+
+namespace dynmesh {
+namespace {
+
+constexpr int kDefaultSurfaceBits = 14;
+constexpr int kMaxPositionBits = 30;
+
+class GetNeighborsReactor final : public ChunkStreamReactor<v1::GetNeighborsResponse> {
+ public:
+  GetNeighborsReactor(const ServiceContext& services, grpc::CallbackServerContext* context,
+                      const v1::GetNeighborsRequest* request)
+      : ChunkStreamReactor("GetNeighbors", context), services_(services), request_(*request) {}
+
+ private:
+  absl::Status Gather() override {
+    DYNMESH_RETURN_IF_ERROR(CheckMessageSize(request_, services_.limits()));
+    DYNMESH_ASSIGN_OR_RETURN(const SessionPtr session, services_.registry.Find(request_.session()));
+    DYNMESH_ASSIGN_OR_RETURN(const Relation relation, ToRelation(request_));
+    DYNMESH_ASSIGN_OR_RETURN(const Selection selection,
+                             ToSelection(request_.selection(), request_.as_of_revision()));
+    DYNMESH_ASSIGN_OR_RETURN(answer_, QueryNeighbors(*session, relation, selection));
+    return absl::OkStatus();
+  }
+
+  absl::StatusOr<bool> NextChunk(v1::GetNeighborsResponse* response) override {
+    if (next_ == answer_.chunks.size()) return false;
+    response->set_revision(answer_.revision);
+    FromNeighborsChunk(std::exchange(answer_.chunks[next_++], {}), response);
+    return true;
+  }
+
+  const ServiceContext services_;
+  const v1::GetNeighborsRequest request_;
+  NeighborsAnswer answer_;
+  size_t next_ = 0;
+};
+
+class GetEntitiesReactor final : public ChunkStreamReactor<v1::GetEntitiesResponse> {
+ public:
+  GetEntitiesReactor(const ServiceContext& services, grpc::CallbackServerContext* context,
+                     const v1::GetEntitiesRequest* request)
+      : ChunkStreamReactor("GetEntities", context), services_(services), request_(*request) {}
+
+ private:
+  absl::Status Gather() override {
+    DYNMESH_RETURN_IF_ERROR(CheckMessageSize(request_, services_.limits()));
+    DYNMESH_ASSIGN_OR_RETURN(const SessionPtr session, services_.registry.Find(request_.session()));
+    DYNMESH_ASSIGN_OR_RETURN(const EntityKind kind, ToEntityKind(request_.kind(), "kind"));
+    DYNMESH_ASSIGN_OR_RETURN(const Selection selection,
+                             ToSelection(request_.selection(), request_.as_of_revision()));
+    DYNMESH_ASSIGN_OR_RETURN(answer_, QueryEntities(*session, kind, selection));
+    return absl::OkStatus();
+  }
+
+  absl::StatusOr<bool> NextChunk(v1::GetEntitiesResponse* response) override {
+    if (next_ == answer_.chunks.size()) return false;
+    response->set_revision(answer_.revision);
+    FromEntitiesChunk(std::exchange(answer_.chunks[next_++], {}), response);
+    return true;
+  }
+
+  const ServiceContext services_;
+  const v1::GetEntitiesRequest request_;
+  EntitiesAnswer answer_;
+  size_t next_ = 0;
+};
+
+/// Where the next piece of `size` items begins; the first piece may be empty, so that a revision arrives.
+template <typename Container>
+bool TakePiece(const Container& items, size_t size, size_t& next, std::pair<size_t, size_t>& piece) {
+  if (next > 0 && next >= items.size()) return false;
+  piece = {next, std::min(size, items.size() - next)};
+  next = std::max<size_t>(next + piece.second, 1);
+  return true;
+}
+
+class GetBoundaryReactor final : public ChunkStreamReactor<v1::GetBoundaryResponse> {
+ public:
+  GetBoundaryReactor(const ServiceContext& services, grpc::CallbackServerContext* context,
+                     const v1::GetBoundaryRequest* request)
+      : ChunkStreamReactor("GetBoundary", context), services_(services), request_(*request) {}
+
+ private:
+  absl::Status Gather() override {
+    DYNMESH_ASSIGN_OR_RETURN(const SessionPtr session, services_.registry.Find(request_.session()));
+    DYNMESH_ASSIGN_OR_RETURN(const EntityKind kind, ToEntityKind(request_.kind(), "kind"));
+    DYNMESH_ASSIGN_OR_RETURN(answer_, QueryBoundary(*session, kind));
+    return absl::OkStatus();
+  }
+
+  absl::StatusOr<bool> NextChunk(v1::GetBoundaryResponse* response) override {
+    std::pair<size_t, size_t> piece;
+    if (!TakePiece(answer_.ids, kChunkBytes / sizeof(Slot), next_, piece)) return false;
+    response->set_revision(answer_.revision);
+    response->set_ids(answer_.ids.data() + piece.first, piece.second * sizeof(Slot));
+    return true;
+  }
+
+  const ServiceContext services_;
+  const v1::GetBoundaryRequest request_;
+  BoundaryAnswer answer_;
+  size_t next_ = 0;
+};
+
+class GetBoundarySurfaceReactor final : public ChunkStreamReactor<v1::GetBoundarySurfaceResponse> {
+ public:
+  GetBoundarySurfaceReactor(const ServiceContext& services, grpc::CallbackServerContext* context,
+                            const v1::GetBoundarySurfaceRequest* request)
+      : ChunkStreamReactor("GetBoundarySurface", context), services_(services), request_(*request) {}
+
+ private:
+  absl::Status Gather() override {
+    const int bits = request_.position_bits() == 0 ? kDefaultSurfaceBits : request_.position_bits();
+    if (bits < 1 || bits > kMaxPositionBits) return BadField("position_bits", "position_bits is outside 0-30");
+    DYNMESH_ASSIGN_OR_RETURN(const SessionPtr session, services_.registry.Find(request_.session()));
+    DYNMESH_ASSIGN_OR_RETURN(answer_, QuerySurface(*session, bits));
+    return absl::OkStatus();
+  }
+
+  absl::StatusOr<bool> NextChunk(v1::GetBoundarySurfaceResponse* response) override {
+    std::pair<size_t, size_t> piece;
+    if (!TakePiece(answer_.drc, kChunkBytes, next_, piece)) return false;
+    response->set_revision(answer_.revision);
+    response->set_drc(answer_.drc.data() + piece.first, piece.second);
+    return true;
+  }
+
+  const ServiceContext services_;
+  const v1::GetBoundarySurfaceRequest request_;
+  SurfaceAnswer answer_;
+  size_t next_ = 0;
+};
+
+class QueriesService final : public v1::QueryService::CallbackService {
+ public:
+  explicit QueriesService(const ServiceContext& services) : services_(services) {}
+
+  grpc::ServerWriteReactor<v1::GetNeighborsResponse>* GetNeighbors(
+      grpc::CallbackServerContext* context, const v1::GetNeighborsRequest* request) override {
+    return (new GetNeighborsReactor(services_, context, request))->Start(services_.quick());
+  }
+
+  grpc::ServerWriteReactor<v1::GetEntitiesResponse>* GetEntities(
+      grpc::CallbackServerContext* context, const v1::GetEntitiesRequest* request) override {
+    return (new GetEntitiesReactor(services_, context, request))->Start(services_.quick());
+  }
+
+  grpc::ServerWriteReactor<v1::GetBoundaryResponse>* GetBoundary(
+      grpc::CallbackServerContext* context, const v1::GetBoundaryRequest* request) override {
+    return (new GetBoundaryReactor(services_, context, request))->Start(services_.quick());
+  }
+
+  grpc::ServerWriteReactor<v1::GetBoundarySurfaceResponse>* GetBoundarySurface(
+      grpc::CallbackServerContext* context, const v1::GetBoundarySurfaceRequest* request) override {
+    return (new GetBoundarySurfaceReactor(services_, context, request))->Start(services_.heavy());
+  }
+
+ private:
+  const ServiceContext services_;
+};
+
+}  // namespace
+
+std::unique_ptr<grpc::Service> MakeQueriesService(const ServiceContext& context) {
+  return std::make_unique<QueriesService>(context);
+}
+
+}  // namespace dynmesh

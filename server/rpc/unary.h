@@ -1,0 +1,41 @@
+#ifndef DYNMESH_SERVER_RPC_UNARY_H_
+#define DYNMESH_SERVER_RPC_UNARY_H_
+
+#include <utility>
+
+#include "absl/status/status.h"
+#include "google/protobuf/message_lite.h"
+#include "grpcpp/support/server_callback.h"
+#include "grpcpp/server_context.h"
+#include "server/rpc/status.h"
+#include "server/session/catch_exceptions.h"
+#include "server/session/executor.h"
+#include "server/session/limits.h"
+#include "server/session/session_errors.h"
+
+namespace dynmesh {
+
+/// RESOURCE_EXHAUSTED LIMIT_EXCEEDED (max_message_bytes) for a request that is too large.
+inline absl::Status CheckMessageSize(const google::protobuf::MessageLite& message, const Limits& limits) {
+  const size_t bytes = message.ByteSizeLong();
+  if (bytes <= limits.max_message_bytes) return absl::OkStatus();
+  return LimitExceeded("max_message_bytes", limits.max_message_bytes, bytes);
+}
+
+/// Answers a unary call by fn(), run on `executor`; fn returns an absl::Status and fills the response before.
+/// A call that was cancelled while it waited is not run.
+template <typename Fn>
+grpc::ServerUnaryReactor* RunUnary(const char* rpc, grpc::CallbackServerContext* context, Executor& executor,
+                                   Fn fn) {
+  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  const absl::Status posted = executor.TryPost([rpc, context, reactor, fn = std::move(fn)] {
+    const absl::Status status = context->IsCancelled() ? CallCancelled() : CatchExceptions(fn);
+    reactor->Finish(LoggedStatus(rpc, status));
+  });
+  if (!posted.ok()) reactor->Finish(LoggedStatus(rpc, posted));
+  return reactor;
+}
+
+}  // namespace dynmesh
+
+#endif  // DYNMESH_SERVER_RPC_UNARY_H_

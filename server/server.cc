@@ -1,0 +1,219 @@
+#include "server/server.h"
+
+#include <arpa/inet.h>
+#include <grpc/support/log.h>
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <thread>
+#include <utility>
+
+#include "absl/strings/match.h"
+#include "absl/strings/numbers.h"
+#include "absl/strings/str_cat.h"
+#include "absl/synchronization/mutex.h"
+#include "absl/time/clock.h"
+#include "grpcpp/ext/proto_server_reflection_plugin.h"
+#include "grpcpp/health_check_service_interface.h"
+#include "grpcpp/impl/service_type.h"
+#include "grpcpp/server.h"
+#include "grpcpp/server_builder.h"
+#include "server/rpc/edits_service.h"
+#include "server/rpc/open_streams.h"
+#include "server/rpc/queries_service.h"
+#include "server/rpc/sessions_service.h"
+#include "server/rpc/subscriptions_service.h"
+#include "server/session/session_errors.h"
+#include "spdlog/spdlog.h"
+
+namespace dynmesh {
+namespace {
+
+constexpr const char* kServiceNames[] = {"dynmesh.v1.SessionService", "dynmesh.v1.EditService",
+                                         "dynmesh.v1.QueryService", "dynmesh.v1.SubscriptionService"};
+// gRPC refuses larger messages before we see them; up to there our own refusal names the limit.
+constexpr uint64_t kHardMessageFactor = 4;
+constexpr int kKeepaliveTimeMs = 30'000;
+constexpr int kKeepaliveTimeoutMs = 10'000;
+constexpr int kMinPingIntervalMs = 5'000;
+
+absl::Status BadAddress(absl::string_view address, absl::string_view message) {
+  return InvalidArgument(reason::kBadArgument, absl::StrCat("address '", address, "' ", message),
+                         {{"field", "listen"}, {"address", std::string(address)}});
+}
+
+struct HostAndPort {
+  std::string host;
+  int port = 0;
+};
+
+absl::StatusOr<HostAndPort> SplitAddress(absl::string_view address) {
+  const size_t colon = address.rfind(':');
+  HostAndPort parts;
+  if (colon == address.npos || colon == 0 || !absl::SimpleAtoi(address.substr(colon + 1), &parts.port) ||
+      parts.port < 0 || parts.port > 65535) {
+    return BadAddress(address, "is not of the form host:port");
+  }
+  parts.host = std::string(address.substr(0, colon));
+  return parts;
+}
+
+bool IsLoopbackHost(std::string host) {
+  if (absl::StartsWith(host, "[") && absl::EndsWith(host, "]")) host = host.substr(1, host.size() - 2);
+  if (host == "localhost") return true;
+  in_addr v4;
+  if (inet_pton(AF_INET, host.c_str(), &v4) == 1) return (ntohl(v4.s_addr) >> 24) == 127;
+  in6_addr v6;
+  return inet_pton(AF_INET6, host.c_str(), &v6) == 1 && IN6_IS_ADDR_LOOPBACK(&v6);
+}
+
+/// gRPC's own log lines go where ours go.
+void LogForGrpc(gpr_log_func_args* args) {
+  const auto level = args->severity == GPR_LOG_SEVERITY_ERROR  ? spdlog::level::warn
+                     : args->severity == GPR_LOG_SEVERITY_INFO ? spdlog::level::debug
+                                                               : spdlog::level::trace;
+  spdlog::log(level, "grpc message=\"{}\"", args->message);
+}
+
+Executor::Options ExecutorOptions(const char* name, int threads, const Limits& limits) {
+  return {name, threads, limits.max_queued_tasks};
+}
+
+int QuickThreads(const ServerOptions& options) {
+  if (options.quick_threads > 0) return options.quick_threads;
+  return std::max<int>(2, std::thread::hardware_concurrency());
+}
+
+}  // namespace
+
+absl::Status CheckLoopback(absl::string_view address) {
+  DYNMESH_ASSIGN_OR_RETURN(const HostAndPort parts, SplitAddress(address));
+  if (IsLoopbackHost(parts.host)) return absl::OkStatus();
+  return BadAddress(address, "can be reached from other machines, and nothing would be encrypted or authenticated: "
+                             "allow that with --allow_insecure");
+}
+
+/// Members are destroyed from the last to the first: gRPC, then the threads, then the sessions.
+class Server::Impl {
+ public:
+  explicit Impl(const ServerOptions& options)
+      : quick_(ExecutorOptions("quick", QuickThreads(options), options.limits)),
+        heavy_(ExecutorOptions("heavy", options.heavy_threads, options.limits)),
+        registry_(options.limits, Workers{&quick_, &heavy_, &timer_}) {
+    const ServiceContext context{registry_, streams_};
+    services_.push_back(MakeSessionsService(context));
+    services_.push_back(MakeEditsService(context));
+    services_.push_back(MakeQueriesService(context));
+    services_.push_back(MakeSubscriptionsService(context));
+  }
+
+  ~Impl() {
+    Drain(absl::ZeroDuration());
+    timer_.Stop();
+    quick_.Stop();
+    heavy_.Stop();
+  }
+
+  absl::StatusOr<std::vector<std::string>> Listen(const ServerOptions& options);
+  void Drain(absl::Duration timeout);
+  SessionRegistry& registry() { return registry_; }
+
+ private:
+  void Configure(const Limits& limits, grpc::ServerBuilder& builder);
+
+  Timer timer_;
+  Executor quick_;
+  Executor heavy_;
+  OpenStreams streams_;
+  SessionRegistry registry_;
+  std::vector<std::unique_ptr<grpc::Service>> services_;
+  absl::Mutex drain_mu_;
+  bool drained_ ABSL_GUARDED_BY(drain_mu_) = false;
+  std::unique_ptr<grpc::Server> grpc_;
+};
+
+void Server::Impl::Configure(const Limits& limits, grpc::ServerBuilder& builder) {
+  for (const auto& service : services_) builder.RegisterService(service.get());
+  builder.SetMaxReceiveMessageSize(
+      static_cast<int>(std::min<uint64_t>(limits.max_message_bytes * kHardMessageFactor, INT32_MAX)));
+  builder.SetMaxSendMessageSize(-1);
+  // A second daemon on the same port must fail, not share the port.
+  builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveTimeMs);
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveTimeoutMs);
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
+  builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, kMinPingIntervalMs);
+}
+
+absl::StatusOr<std::vector<std::string>> Server::Impl::Listen(const ServerOptions& options) {
+  grpc::ServerBuilder builder;
+  Configure(options.limits, builder);
+  std::vector<std::string> addresses;
+  std::vector<int> ports(options.listen.size(), -1);
+  for (size_t i = 0; i < options.listen.size(); ++i) {
+    builder.AddListeningPort(options.listen[i], grpc::InsecureServerCredentials(), &ports[i]);
+  }
+  int unix_port = -1;
+  const std::string unix_target = absl::StrCat("unix:", options.unix_socket);
+  if (!options.unix_socket.empty()) {
+    builder.AddListeningPort(unix_target, grpc::InsecureServerCredentials(), &unix_port);
+  }
+  const mode_t mask = umask(0077);  // so that the socket's file is the user's own from the beginning
+  grpc_ = builder.BuildAndStart();
+  umask(mask);
+  for (size_t i = 0; i < options.listen.size(); ++i) {
+    if (grpc_ == nullptr || ports[i] <= 0) {
+      return absl::UnavailableError(absl::StrCat("cannot listen on ", options.listen[i]));
+    }
+    DYNMESH_ASSIGN_OR_RETURN(const HostAndPort parts, SplitAddress(options.listen[i]));
+    addresses.push_back(absl::StrCat(parts.host, ":", ports[i]));
+  }
+  if (!options.unix_socket.empty()) {
+    if (grpc_ == nullptr || unix_port <= 0) {
+      return absl::UnavailableError(absl::StrCat("cannot listen on ", unix_target));
+    }
+    addresses.push_back(unix_target);
+  }
+  for (const char* name : kServiceNames) grpc_->GetHealthCheckService()->SetServingStatus(name, true);
+  return addresses;
+}
+
+void Server::Impl::Drain(absl::Duration timeout) {
+  absl::MutexLock lock(&drain_mu_);
+  if (drained_ || grpc_ == nullptr) return;
+  drained_ = true;
+  spdlog::info("draining timeout_ms={}", absl::ToInt64Milliseconds(timeout));
+  grpc_->GetHealthCheckService()->SetServingStatus(false);
+  registry_.Drain();
+  streams_.Drain();
+  grpc_->Shutdown(absl::ToChronoTime(absl::Now() + timeout));
+  grpc_->Wait();
+  spdlog::info("drained");
+}
+
+absl::StatusOr<std::unique_ptr<Server>> Server::Start(const ServerOptions& options) {
+  if (options.listen.empty() && options.unix_socket.empty()) {
+    return BadAddress("", "is missing: there is nothing to listen on");
+  }
+  for (const std::string& address : options.listen) {
+    DYNMESH_RETURN_IF_ERROR(SplitAddress(address).status());
+    if (!options.allow_insecure) DYNMESH_RETURN_IF_ERROR(CheckLoopback(address));
+  }
+  gpr_set_log_function(LogForGrpc);
+  grpc::EnableDefaultHealthCheckService(true);
+  grpc::reflection::InitProtoReflectionServerBuilderPlugin();
+  auto impl = std::make_unique<Impl>(options);
+  DYNMESH_ASSIGN_OR_RETURN(std::vector<std::string> addresses, impl->Listen(options));
+  std::unique_ptr<Server> server(new Server(std::move(impl)));
+  server->addresses_ = std::move(addresses);
+  return server;
+}
+
+Server::Server(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+Server::~Server() = default;
+
+void Server::Drain(absl::Duration timeout) { impl_->Drain(timeout); }
+
+SessionRegistry& Server::registry() { return impl_->registry(); }
+
+}  // namespace dynmesh

@@ -1,0 +1,62 @@
+#ifndef DYNMESH_SERVER_SESSION_EXECUTOR_H_
+#define DYNMESH_SERVER_SESSION_EXECUTOR_H_
+
+#include <cstddef>
+#include <deque>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "absl/base/thread_annotations.h"
+#include "absl/functional/any_invocable.h"
+#include "absl/status/status.h"
+#include "absl/synchronization/mutex.h"
+
+namespace dynmesh {
+
+/// A fixed number of threads and a bounded queue in front of them.
+///
+/// Reactors of gRPC never compute: they hand a call to TryPost(), which refuses when too many wait already.
+/// What an admitted call does next (the following step of a stream) goes to Post(), whose number is bounded
+/// by the calls that were admitted.
+/// A task must not wait for another task. Exceptions that escape one are logged and dropped, so a task that
+/// owes somebody an answer catches them itself (catch_exceptions.h).
+/// Thread safety: full.
+class Executor {
+ public:
+  using Task = absl::AnyInvocable<void()>;
+
+  struct Options {
+    std::string name;        ///< for the log
+    int threads = 2;
+    size_t max_queued = 10'000;
+  };
+
+  explicit Executor(const Options& options);
+  Executor(const Executor&) = delete;
+  Executor& operator=(const Executor&) = delete;
+  ~Executor() { Stop(); }
+
+  /// Errors: RESOURCE_EXHAUSTED LIMIT_EXCEEDED (max_queued_tasks); UNAVAILABLE SHUTTING_DOWN after Stop().
+  absl::Status TryPost(Task task);
+
+  /// Never refused; after Stop() the task is dropped.
+  void Post(Task task);
+
+  /// Runs what waits, then joins. Called once; not from a task.
+  void Stop();
+
+ private:
+  void Work();
+  bool HasWorkOrStops() const ABSL_SHARED_LOCKS_REQUIRED(mu_) { return stopping_ || !queue_.empty(); }
+
+  const Options options_;
+  absl::Mutex mu_;
+  std::deque<Task> queue_ ABSL_GUARDED_BY(mu_);
+  bool stopping_ ABSL_GUARDED_BY(mu_) = false;
+  std::vector<std::thread> threads_;
+};
+
+}  // namespace dynmesh
+
+#endif  // DYNMESH_SERVER_SESSION_EXECUTOR_H_

@@ -1,0 +1,66 @@
+#include "server/session/fingerprint.h"
+
+#include <variant>
+
+#include "xxhash.h"
+
+namespace dynmesh {
+namespace {
+
+/// Adds the fields of each kind of edit.
+struct EditVisitor {
+  Fingerprint& fingerprint;
+
+  void operator()(const AddVerticesEdit& edit) { fingerprint.AddArray(edit.positions); }
+  void operator()(const RemoveVerticesEdit& edit) { fingerprint.AddArray(edit.vertices); }
+  void operator()(const MoveVerticesEdit& edit) {
+    fingerprint.AddArray(edit.vertices);
+    fingerprint.AddArray(edit.positions);
+  }
+  void operator()(const AddElementsEdit& edit) {
+    fingerprint.AddNumber(static_cast<uint64_t>(edit.type));
+    fingerprint.AddArray(edit.vertices);
+  }
+  void operator()(const RemoveElementsEdit& edit) {
+    fingerprint.AddNumber(Dimension(edit.kind));
+    fingerprint.AddArray(edit.elements);
+  }
+  void operator()(const AddAttributeEdit& edit) { fingerprint.AddSpec(edit.spec); }
+  void operator()(const SetAttributeEdit& edit) {
+    fingerprint.AddSpec(edit.spec);
+    fingerprint.AddArray(edit.slots);
+    fingerprint.AddArray(edit.rows);
+  }
+};
+
+}  // namespace
+
+Fingerprint::Fingerprint()
+    : state_(XXH64_createState(), [](XXH64_state_s* state) { XXH64_freeState(state); }) {
+  XXH64_reset(state_.get(), 0);
+}
+
+Fingerprint::~Fingerprint() = default;
+
+void Fingerprint::AddBytes(const void* data, size_t size) { XXH64_update(state_.get(), data, size); }
+
+void Fingerprint::AddString(absl::string_view text) {
+  AddNumber(text.size());
+  AddBytes(text.data(), text.size());
+}
+
+void Fingerprint::AddSpec(const AttributeSpec& spec) {
+  AddString(spec.name);
+  AddNumber(Dimension(spec.kind));
+  AddNumber(static_cast<uint64_t>(spec.type));
+  AddNumber(spec.components);
+}
+
+void Fingerprint::AddEdit(const Edit& edit) {
+  AddNumber(edit.index());
+  std::visit(EditVisitor{*this}, edit);
+}
+
+uint64_t Fingerprint::value() const { return XXH64_digest(state_.get()); }
+
+}  // namespace dynmesh

@@ -1,0 +1,114 @@
+#include "server/session/importer/importer.h"
+
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
+
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "absl/time/clock.h"
+#include "server/session/answer_memory.h"
+#include "spdlog/spdlog.h"
+
+namespace dynmesh {
+namespace {
+
+absl::Status CheckAnnounced(const ImportOptions& options, const Limits& limits) {
+  if (options.num_vertices > limits.max_vertices) {
+    return LimitExceeded("max_vertices", limits.max_vertices, options.num_vertices);
+  }
+  const uint64_t max_elements = uint64_t{limits.max_edges} + limits.max_faces + limits.max_cells;
+  if (options.num_elements > max_elements) {
+    return LimitExceeded("max_cells", limits.max_cells, options.num_elements);
+  }
+  return absl::OkStatus();
+}
+
+absl::Status CheckAnnouncedCount(absl::string_view what, uint64_t announced, uint64_t received) {
+  if (announced == 0 || announced == received) return absl::OkStatus();
+  return InvalidArgument(
+      reason::kCountMismatch,
+      absl::StrCat(announced, " ", what, " were announced and ", received, " arrived"),
+      {{"field", absl::StrCat("num_", what)},
+       {"expected", absl::StrCat(announced)},
+       {"actual", absl::StrCat(received)}});
+}
+
+/// Gives the freed pieces back to the system, so that staging does not count against a daemon for ever.
+void TrimHeap() {
+#ifdef __GLIBC__
+  malloc_trim(0);
+#endif
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<ImportGate::Ticket>> ImportGate::Enter() {
+  auto ticket = std::make_unique<Ticket>(count_);
+  const uint32_t count = ++count_;
+  if (count > max_imports_) return LimitExceeded("max_concurrent_imports", max_imports_, count);
+  return ticket;
+}
+
+absl::StatusOr<std::unique_ptr<Importer>> Importer::Start(SessionPtr session, ImportGate& gate,
+                                                          const ImportOptions& options) {
+  DYNMESH_RETURN_IF_ERROR(CheckRequestId(options.request_id));
+  DYNMESH_RETURN_IF_ERROR(CheckAnnounced(options, session->limits()));
+  // A retry has to arrive in full before it is known to be one.
+  if (options.request_id.empty() || options.validate_only) DYNMESH_RETURN_IF_ERROR(session->CheckEmpty());
+  DYNMESH_ASSIGN_OR_RETURN(std::unique_ptr<ImportGate::Ticket> ticket, gate.Enter());
+  return std::unique_ptr<Importer>(new Importer(std::move(session), std::move(ticket), options));
+}
+
+Importer::Importer(SessionPtr session, std::unique_ptr<ImportGate::Ticket> ticket,
+                   const ImportOptions& options)
+    : session_(std::move(session)), ticket_(std::move(ticket)), options_(options), staged_(session_->limits()) {}
+
+absl::StatusOr<Importer::OutcomePtr> Importer::Finish(ImportMonitor& monitor) {
+  DYNMESH_RETURN_IF_ERROR(CheckCounts());
+  if (options_.request_id.empty() || options_.validate_only) return BuildAndAdopt(monitor);
+  const uint64_t fingerprint = staged_.Fingerprint();
+  DYNMESH_ASSIGN_OR_RETURN(OutcomePtr remembered, session_->FindImport(options_.request_id, fingerprint));
+  if (remembered != nullptr) return remembered;
+  DYNMESH_RETURN_IF_ERROR(session_->CheckEmpty());
+  DYNMESH_ASSIGN_OR_RETURN(OutcomePtr outcome, BuildAndAdopt(monitor));
+  session_->RememberImport(options_.request_id, fingerprint, outcome);
+  return outcome;
+}
+
+absl::Status Importer::CheckCounts() const {
+  DYNMESH_RETURN_IF_ERROR(CheckAnnouncedCount("vertices", options_.num_vertices, staged_.num_vertices()));
+  DYNMESH_RETURN_IF_ERROR(CheckAnnouncedCount("elements", options_.num_elements, staged_.num_elements()));
+  return staged_.CheckColumns();
+}
+
+absl::StatusOr<Importer::OutcomePtr> Importer::BuildAndAdopt(ImportMonitor& monitor) {
+  const absl::Time begin = absl::Now();
+  const Limits& limits = session_->limits();
+  MeshBuilder builder({session_->settings().duplicates, ToMeshLimits(limits)}, limits, monitor);
+  DYNMESH_ASSIGN_OR_RETURN(Mesh mesh, builder.Build(std::move(staged_)));
+  auto outcome = std::make_shared<ImportOutcome>();
+  outcome->warnings = builder.warnings();
+  if (options_.validate_only) {
+    DYNMESH_ASSIGN_OR_RETURN(const SessionInfo present, session_->Info());
+    outcome->info = DescribeMesh(mesh, SummaryCache().Of(mesh));
+    outcome->info.name = present.name;
+    outcome->info.etag = present.etag;
+    outcome->info.settings = present.settings;
+    outcome->info.create_time = present.create_time;
+    outcome->info.update_time = present.update_time;
+    outcome->info.revision = present.revision;
+  } else {
+    DYNMESH_RETURN_IF_ERROR(session_->Adopt(mesh));
+    DYNMESH_ASSIGN_OR_RETURN(outcome->info, session_->Info());
+    spdlog::info("import session={} vertices={} cells={} build_ms={}", session_->name(),
+                 outcome->info.counts[0], outcome->info.counts[3],
+                 absl::ToInt64Milliseconds(absl::Now() - begin));
+  }
+  outcome->revision = outcome->info.revision;
+  TrimHeap();
+  return OutcomePtr(std::move(outcome));
+}
+
+}  // namespace dynmesh

@@ -1,0 +1,57 @@
+#ifndef DYNMESH_SERVER_SESSION_LIMITS_H_
+#define DYNMESH_SERVER_SESSION_LIMITS_H_
+
+#include <algorithm>
+#include <cstdint>
+
+#include "core/mesh/mesh.h"
+
+namespace dynmesh {
+
+/// What one daemon gives away. Beyond any of them: RESOURCE_EXHAUSTED LIMIT_EXCEEDED, whose metadata "limit"
+/// is the name of the field here, which is also the name of dynmeshd's flag.
+struct Limits {
+  uint32_t max_sessions = 1000;
+  /// Slots of a session of each kind; edges and faces include the derived ones.
+  uint32_t max_vertices = 200'000'000;
+  uint32_t max_edges = 1'500'000'000;
+  uint32_t max_faces = 500'000'000;
+  uint32_t max_cells = 200'000'000;
+  /// Memory of one session's mesh; looked at before each batch and during an import.
+  uint64_t max_session_bytes = uint64_t{64} << 30;
+  /// Edits in a batch, and vertices, elements and rows that these name.
+  uint64_t max_batch_edits = 100'000;
+  uint64_t max_batch_items = 1'000'000;
+  /// One request message.
+  uint64_t max_message_bytes = uint64_t{4} << 20;
+  /// One answer of a query or export, which is gathered in memory so that it speaks of one revision.
+  uint64_t max_query_bytes = uint64_t{512} << 20;
+  /// Subscriptions of one session.
+  uint32_t max_followers = 1000;
+  /// Imports that are receiving or building.
+  uint32_t max_concurrent_imports = 4;
+  /// Calls that wait for a thread.
+  uint32_t max_queued_tasks = 10'000;
+
+  uint32_t max_slots(EntityKind kind) const {
+    const uint32_t slots[] = {max_vertices, max_edges, max_faces, max_cells};
+    return slots[Dimension(kind)];
+  }
+};
+
+/// Names of the limits on slots, by EntityKind.
+inline constexpr const char* kSlotLimitNames[] = {"max_vertices", "max_edges", "max_faces", "max_cells"};
+
+/// The part of `limits` that a mesh enforces itself.
+inline MeshLimits ToMeshLimits(const Limits& limits) {
+  MeshLimits mesh_limits;
+  for (EntityKind kind : kEntityKinds) {
+    uint32_t& slots = mesh_limits.max_slots[Dimension(kind)];
+    slots = std::min(slots, limits.max_slots(kind));
+  }
+  return mesh_limits;
+}
+
+}  // namespace dynmesh
+
+#endif  // DYNMESH_SERVER_SESSION_LIMITS_H_

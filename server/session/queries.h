@@ -1,0 +1,75 @@
+#ifndef DYNMESH_SERVER_SESSION_QUERIES_H_
+#define DYNMESH_SERVER_SESSION_QUERIES_H_
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "core/mesh/relations.h"
+#include "server/session/selection.h"
+#include "server/session/session.h"
+
+/// Reading a session. Each answer is gathered under one reader lock, so it speaks of one revision, into
+/// chunks of at most kChunkBytes; beyond the session's max_query_bytes it is refused with RESOURCE_EXHAUSTED.
+/// There is always a first chunk, even without rows.
+namespace dynmesh {
+
+/// Rows of neighbours: row i has offsets[i + 1] - offsets[i] of them. A row longer than half a chunk is cut: it
+/// begins in chunks without ids, and the offsets of the chunk with its id count from there.
+struct NeighborsChunk {
+  std::vector<Slot> ids;
+  std::vector<uint32_t> offsets = {0};
+  std::vector<Slot> neighbors;
+};
+struct NeighborsAnswer {
+  int64_t revision = 0;
+  std::vector<NeighborsChunk> chunks;
+};
+
+/// Errors: NOT_FOUND ENTITY_REMOVED or UNKNOWN_ENTITY (metadata ids: the first that are not live); OUT_OF_RANGE
+/// REVISION_IN_FUTURE; RESOURCE_EXHAUSTED LIMIT_EXCEEDED (max_query_bytes).
+absl::StatusOr<NeighborsAnswer> QueryNeighbors(const Session& session, Relation relation,
+                                               const Selection& selection);
+
+enum EntityFlags : uint8_t { kIsElement = 1, kIsOnBoundary = 2, kIsDuplicate = 4 };
+
+struct EntitiesChunk {
+  std::vector<Slot> ids;
+  std::vector<Point> positions;           ///< vertices only
+  std::vector<ElementType> types;         ///< all but vertices
+  std::vector<uint32_t> vertex_offsets;   ///< all but vertices
+  std::vector<VertexId> vertices;         ///< all but vertices
+  std::vector<uint8_t> flags;
+  std::vector<int64_t> born_revisions;
+};
+struct EntitiesAnswer {
+  int64_t revision = 0;
+  std::vector<EntitiesChunk> chunks;
+};
+
+/// Errors: as QueryNeighbors.
+absl::StatusOr<EntitiesAnswer> QueryEntities(const Session& session, EntityKind kind,
+                                             const Selection& selection);
+
+struct BoundaryAnswer {
+  int64_t revision = 0;
+  std::vector<Slot> ids;  ///< ascending
+};
+
+/// Errors: INVALID_ARGUMENT BAD_ENTITY_KIND for cells; RESOURCE_EXHAUSTED LIMIT_EXCEEDED.
+absl::StatusOr<BoundaryAnswer> QueryBoundary(const Session& session, EntityKind kind);
+
+struct SurfaceAnswer {
+  int64_t revision = 0;
+  std::string drc;  ///< a whole file
+};
+
+/// Faces with exactly one cell and faces that are elements, encoded without the lock. Quads are cut along the
+/// diagonal of their first vertex. REQUIRES: 1 <= position_bits <= 30.
+/// Errors: FAILED_PRECONDITION when there is no surface; RESOURCE_EXHAUSTED LIMIT_EXCEEDED.
+absl::StatusOr<SurfaceAnswer> QuerySurface(const Session& session, int position_bits);
+
+}  // namespace dynmesh
+
+#endif  // DYNMESH_SERVER_SESSION_QUERIES_H_

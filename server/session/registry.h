@@ -1,0 +1,68 @@
+#ifndef DYNMESH_SERVER_SESSION_REGISTRY_H_
+#define DYNMESH_SERVER_SESSION_REGISTRY_H_
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "absl/base/thread_annotations.h"
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+#include "absl/synchronization/mutex.h"
+#include "server/session/answer_memory.h"
+#include "server/session/importer/importer.h"
+#include "server/session/limits.h"
+#include "server/session/session.h"
+#include "server/session/workers.h"
+
+namespace dynmesh {
+
+/// The sessions of a daemon by name.
+///
+/// Thread safety: full. Its lock is held for look-ups only, never while a session works.
+class SessionRegistry {
+ public:
+  SessionRegistry(const Limits& limits, const Workers& workers)
+      : limits_(limits), workers_(workers), import_gate_(limits.max_concurrent_imports) {}
+
+  /// Makes an empty session. The same request_id with the same name and settings: what the first call gave.
+  /// Errors: INVALID_ARGUMENT BAD_SESSION_NAME, REQUEST_ID_REUSED; ALREADY_EXISTS SESSION_EXISTS;
+  /// RESOURCE_EXHAUSTED LIMIT_EXCEEDED (max_sessions); UNAVAILABLE SHUTTING_DOWN.
+  absl::StatusOr<SessionInfo> Create(const std::string& name, const SessionSettings& settings,
+                                     const std::string& request_id);
+
+  /// Errors: NOT_FOUND SESSION_NOT_FOUND.
+  absl::StatusOr<SessionPtr> Find(absl::string_view name) const;
+
+  /// Up to `max_sessions` sessions with names after `after`, sorted by name.
+  std::vector<SessionPtr> ListAfter(absl::string_view after, size_t max_sessions) const;
+
+  /// Deletes a session and ends what follows it; returns its last revision.
+  /// Errors: NOT_FOUND SESSION_NOT_FOUND; ABORTED ETAG_MISMATCH.
+  absl::StatusOr<int64_t> Delete(absl::string_view name, absl::string_view etag);
+
+  /// Ends all subscriptions with UNAVAILABLE SHUTTING_DOWN, and refuses new ones and new sessions.
+  void Drain();
+
+  ImportGate& import_gate() { return import_gate_; }
+  const Limits& limits() const { return limits_; }
+  const Workers& workers() const { return workers_; }
+
+ private:
+  absl::StatusOr<SessionPtr> Insert(const std::string& name, const SessionSettings& settings)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
+
+  const Limits limits_;
+  const Workers workers_;
+  ImportGate import_gate_;
+  mutable absl::Mutex mu_;
+  std::map<std::string, SessionPtr, std::less<>> sessions_ ABSL_GUARDED_BY(mu_);
+  AnswerMemory<SessionInfo> created_ ABSL_GUARDED_BY(mu_);
+  bool draining_ ABSL_GUARDED_BY(mu_) = false;
+};
+
+}  // namespace dynmesh
+
+#endif  // DYNMESH_SERVER_SESSION_REGISTRY_H_

@@ -1,0 +1,239 @@
+#include "server/session/session.h"
+
+#include <algorithm>
+#include <limits>
+#include <random>
+#include <utility>
+#include <variant>
+
+#include "absl/strings/ascii.h"
+#include "absl/strings/str_cat.h"
+#include "absl/time/clock.h"
+#include "core/mesh/error.h"
+#include "server/session/catch_exceptions.h"
+#include "server/session/fingerprint.h"
+#include "server/session/session_errors.h"
+#include "spdlog/spdlog.h"
+
+namespace dynmesh {
+namespace {
+
+constexpr size_t kMaxNameBytes = 64;
+// A mesh is measured after so many new items, not for each batch.
+constexpr uint64_t kItemsBetweenChecks = 1000;
+
+uint64_t RandomId() {
+  std::random_device device;
+  return uint64_t{device()} << 32 | device();
+}
+
+uint64_t FingerprintOf(absl::Span<const Edit> edits, const ApplyOptions& options) {
+  Fingerprint fingerprint;
+  fingerprint.AddNumber(options.as_of_revision);
+  fingerprint.AddNumber(options.if_revision.has_value());
+  fingerprint.AddNumber(options.if_revision.value_or(0));
+  for (const Edit& edit : edits) fingerprint.AddEdit(edit);
+  return fingerprint.value();
+}
+
+size_t BytesOf(const BatchResult& result) {
+  size_t bytes = sizeof(result) + (result.degenerate.size() + result.duplicate.size()) * sizeof(EntityId);
+  for (const EditResult& edit : result.results) bytes += sizeof(edit) + edit.new_slots.size() * sizeof(Slot);
+  return bytes;
+}
+
+bool Grows(const Edit& edit) {
+  return std::holds_alternative<AddVerticesEdit>(edit) || std::holds_alternative<AddElementsEdit>(edit) ||
+         std::holds_alternative<AddAttributeEdit>(edit) || std::holds_alternative<SetAttributeEdit>(edit);
+}
+
+absl::Status CheckBatchSize(absl::Span<const Edit> edits, const Limits& limits) {
+  if (edits.size() > limits.max_batch_edits) {
+    return LimitExceeded("max_batch_edits", limits.max_batch_edits, edits.size());
+  }
+  uint64_t items = 0;
+  for (const Edit& edit : edits) items += NumItems(edit);
+  if (items > limits.max_batch_items) {
+    return LimitExceeded("max_batch_items", limits.max_batch_items, items);
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::Status CheckSessionName(absl::string_view name) {
+  const bool known_characters = std::all_of(name.begin(), name.end(), [](unsigned char c) {
+    return absl::ascii_isalnum(c) || c == '_' || c == '.' || c == '-';
+  });
+  if (!name.empty() && name.size() <= kMaxNameBytes && known_characters && absl::ascii_isalnum(name[0])) {
+    return absl::OkStatus();
+  }
+  return InvalidArgument(
+      reason::kBadSessionName,
+      "a session name has 1-64 characters of [A-Za-z0-9_.-] and starts with a letter or a digit",
+      {{"field", "name"}});
+}
+
+Session::Session(const Options& options)
+    : options_(options),
+      creation_id_(RandomId()),
+      create_time_(absl::Now()),
+      mesh_(MeshOptions{options.settings.duplicates, ToMeshLimits(options.limits)}),
+      commit_time_(create_time_),
+      followers_(options.limits.max_followers),
+      deltas_(*this) {}
+
+absl::Status Session::Read(absl::FunctionRef<absl::Status(const SessionView&)> fn) const {
+  absl::ReaderMutexLock lock(&mu_);
+  DYNMESH_RETURN_IF_ERROR(gone_);
+  return fn(SessionView{mesh_, commit_time_});
+}
+
+absl::StatusOr<SessionInfo> Session::Info() const {
+  SessionInfo info;
+  DYNMESH_RETURN_IF_ERROR(Read([&](const SessionView& view) {
+    info = DescribeMesh(view.mesh, summary_.Of(view.mesh));
+    info.update_time = view.commit_time;
+    return absl::OkStatus();
+  }));
+  info.name = name();
+  info.settings = settings();
+  info.etag = EtagAt(info.revision);
+  info.create_time = create_time_;
+  info.followers = followers_.size();
+  return info;
+}
+
+absl::StatusOr<Session::AnswerPtr> Session::Apply(absl::Span<const Edit> edits, const ApplyOptions& options) {
+  DYNMESH_RETURN_IF_ERROR(CheckRequestId(options.request_id));
+  DYNMESH_RETURN_IF_ERROR(CheckBatchSize(edits, limits()));
+  const bool once = !options.request_id.empty() && !options.validate_only;
+  const uint64_t fingerprint = once ? FingerprintOf(edits, options) : 0;
+  const int64_t revision_before = revision();
+  absl::StatusOr<AnswerPtr> answer;
+  {
+    absl::WriterMutexLock lock(&mu_);
+    DYNMESH_RETURN_IF_ERROR(gone_);
+    answer = once ? ApplyOnce(edits, options, fingerprint) : ApplyLocked(edits, options);
+  }
+  if (revision() != revision_before) followers_.Wake();
+  return answer;
+}
+
+absl::StatusOr<Session::AnswerPtr> Session::ApplyOnce(absl::Span<const Edit> edits,
+                                                      const ApplyOptions& options, uint64_t fingerprint) {
+  DYNMESH_ASSIGN_OR_RETURN(AnswerPtr remembered, answers_.Find(options.request_id, fingerprint));
+  if (remembered != nullptr) return remembered;
+  DYNMESH_ASSIGN_OR_RETURN(AnswerPtr answer, ApplyLocked(edits, options));
+  answers_.Remember(options.request_id, fingerprint, answer, BytesOf(*answer));
+  return answer;
+}
+
+absl::StatusOr<Session::AnswerPtr> Session::ApplyLocked(absl::Span<const Edit> edits,
+                                                        const ApplyOptions& options) {
+  DYNMESH_RETURN_IF_ERROR(CheckRevisions(options));
+  if (edits.empty()) return Unchanged();
+  DYNMESH_RETURN_IF_ERROR(CheckMemory(edits));
+  BatchOptions batch;
+  if (options.as_of_revision != 0) batch.as_of_revision = options.as_of_revision;
+  batch.dry_run = options.validate_only;
+  bool returned = false;
+  absl::StatusOr<BatchResult> result = CatchExceptions([&] {
+    absl::StatusOr<BatchResult> applied = ApplyBatch(mesh_, edits, batch);
+    returned = true;
+    return applied;
+  });
+  if (!returned) {
+    spdlog::error("session_damaged name={} error=\"{}\"", name(), result.status().ToString());
+    gone_ = SessionDamaged(name());
+    return gone_;
+  }
+  if (!result.ok()) return result.status();
+  if (!options.validate_only) Committed();
+  return std::make_shared<const BatchResult>(*std::move(result));
+}
+
+absl::Status Session::CheckRevisions(const ApplyOptions& options) const {
+  const int64_t now = mesh_.revision();
+  if (options.as_of_revision < 0) return BadField("as_of_revision", "as_of_revision is negative");
+  if (options.as_of_revision > now) return RevisionInFuture(options.as_of_revision, now);
+  const int64_t expected = options.if_revision.value_or(now);
+  return expected == now ? absl::OkStatus() : RevisionMismatch(expected, now);
+}
+
+absl::Status Session::CheckMemory(absl::Span<const Edit> edits) {
+  if (std::none_of(edits.begin(), edits.end(), Grows)) return absl::OkStatus();
+  for (const Edit& edit : edits) items_since_check_ += NumItems(edit);
+  if (items_since_check_ < kItemsBetweenChecks) return absl::OkStatus();
+  const uint64_t bytes = mesh_.memory_bytes();
+  if (bytes > limits().max_session_bytes) {
+    return LimitExceeded("max_session_bytes", limits().max_session_bytes, bytes);
+  }
+  items_since_check_ = 0;
+  return absl::OkStatus();
+}
+
+Session::AnswerPtr Session::Unchanged() const {
+  auto result = std::make_shared<BatchResult>();
+  result->revision = mesh_.revision();
+  result->checksum = mesh_.checksum();
+  for (EntityKind kind : kEntityKinds) result->counts[Dimension(kind)] = mesh_.NumLive(kind);
+  return result;
+}
+
+void Session::Committed() {
+  commit_time_ = absl::Now();
+  revision_.store(mesh_.revision());
+}
+
+absl::Status Session::CheckEmpty() const {
+  absl::ReaderMutexLock lock(&mu_);
+  return CheckEmptyLocked();
+}
+
+absl::Status Session::CheckEmptyLocked() const {
+  DYNMESH_RETURN_IF_ERROR(gone_);
+  return mesh_.revision() == 0 ? absl::OkStatus() : SessionNotEmpty(name(), mesh_.revision());
+}
+
+absl::Status Session::Adopt(Mesh& mesh) {
+  {
+    absl::WriterMutexLock lock(&mu_);
+    DYNMESH_RETURN_IF_ERROR(CheckEmptyLocked());
+    std::swap(mesh_, mesh);
+    Committed();
+  }
+  followers_.Wake();
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::shared_ptr<const ImportOutcome>> Session::FindImport(absl::string_view request_id,
+                                                                         uint64_t fingerprint) const {
+  absl::ReaderMutexLock lock(&mu_);
+  DYNMESH_RETURN_IF_ERROR(gone_);
+  return imports_.Find(request_id, fingerprint);
+}
+
+void Session::RememberImport(const std::string& request_id, uint64_t fingerprint,
+                             std::shared_ptr<const ImportOutcome> outcome) {
+  absl::WriterMutexLock lock(&mu_);
+  imports_.Remember(request_id, fingerprint, std::move(outcome), 0);
+}
+
+absl::StatusOr<int64_t> Session::Delete(absl::string_view etag) {
+  {
+    absl::WriterMutexLock lock(&mu_);
+    if (absl::IsNotFound(gone_)) return gone_;
+    const std::string present = EtagAt(mesh_.revision());
+    if (!etag.empty() && etag != present) return EtagMismatch(name(), present);
+    gone_ = SessionDeleted(name());
+  }
+  followers_.Close(SessionDeleted(name()));
+  return revision();
+}
+
+std::string Session::EtagAt(int64_t revision) const {
+  return absl::StrCat(absl::Hex(creation_id_, absl::kZeroPad16), "-", revision);
+}
+
+}  // namespace dynmesh

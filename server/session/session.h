@@ -1,0 +1,160 @@
+#ifndef DYNMESH_SERVER_SESSION_SESSION_H_
+#define DYNMESH_SERVER_SESSION_SESSION_H_
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "absl/base/thread_annotations.h"
+#include "absl/functional/function_ref.h"
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+#include "absl/synchronization/mutex.h"
+#include "absl/time/time.h"
+#include "absl/types/optional.h"
+#include "absl/types/span.h"
+#include "core/edit/transaction.h"
+#include "core/mesh/mesh.h"
+#include "server/session/answer_memory.h"
+#include "server/session/delta_source.h"
+#include "server/session/follower_list.h"
+#include "server/session/limits.h"
+#include "server/session/session_info.h"
+#include "server/session/workers.h"
+
+namespace dynmesh {
+
+/// How a batch is to be applied; the fields are those of ApplyEditsRequest.
+struct ApplyOptions {
+  int64_t as_of_revision = 0;  ///< 0: the current revision
+  absl::optional<int64_t> if_revision = absl::nullopt;
+  std::string request_id = {};  ///< empty: none; ignored when validate_only
+  bool validate_only = false;
+};
+
+/// What a session holds while somebody reads it.
+struct SessionView {
+  const Mesh& mesh;
+  absl::Time commit_time;  ///< of mesh.revision()
+};
+
+/// What an import gave, and what a retry of it gets again.
+struct ImportOutcome;
+
+/// INVALID_ARGUMENT BAD_SESSION_NAME unless `name` is 1-64 of [A-Za-z0-9_.-] and starts with a letter or digit.
+absl::Status CheckSessionName(absl::string_view name);
+
+/// A named mesh with its revision, its lock and its followers.
+///
+///     Session ── mu_ (reader/writer) ── Mesh, commit time, answers to request ids
+///        ├────── FollowerList ── Follower ── DeltaSink (an RPC stream)
+///        └────── DeltaSource ── encoded payloads shared by followers, quantisation grids
+///
+/// Edits take the writer lock for as long as they compute; reads share the reader lock. Neither is held over
+/// network or encoding. Followers are woken after each commit, when the lock is free again.
+/// Once deleted, every call fails with NOT_FOUND SESSION_DELETED.
+/// Thread safety: full. Always owned by a shared_ptr.
+class Session {
+ public:
+  struct Options {
+    std::string name;
+    SessionSettings settings;
+    Limits limits;
+    Workers workers;
+  };
+
+  explicit Session(const Options& options);
+  Session(const Session&) = delete;
+  Session& operator=(const Session&) = delete;
+
+  const std::string& name() const { return options_.name; }
+  const SessionSettings& settings() const { return options_.settings; }
+  const Limits& limits() const { return options_.limits; }
+  const Workers& workers() const { return options_.workers; }
+  /// Of the last commit. Never waits.
+  int64_t revision() const { return revision_.load(); }
+
+  /// Calls fn under the reader lock and returns what it returns.
+  absl::Status Read(absl::FunctionRef<absl::Status(const SessionView&)> fn) const ABSL_LOCKS_EXCLUDED(mu_);
+
+  /// The same for a function with a result.
+  template <typename T>
+  absl::StatusOr<T> ReadAs(absl::FunctionRef<absl::StatusOr<T>(const SessionView&)> fn) const {
+    absl::StatusOr<T> result;
+    const absl::Status read = Read([&](const SessionView& view) {
+      result = fn(view);
+      return result.status();
+    });
+    if (!read.ok()) return read;
+    return result;
+  }
+
+  absl::StatusOr<SessionInfo> Info() const ABSL_LOCKS_EXCLUDED(mu_);
+
+  /// Applies a batch as one revision, all or nothing. Without edits it answers with the current state.
+  /// Errors: those of ApplyBatch; ABORTED REVISION_MISMATCH (metadata expected, actual); OUT_OF_RANGE
+  /// REVISION_IN_FUTURE; INVALID_ARGUMENT REQUEST_ID_REUSED; RESOURCE_EXHAUSTED. Nothing changed then.
+  absl::StatusOr<std::shared_ptr<const BatchResult>> Apply(absl::Span<const Edit> edits,
+                                                           const ApplyOptions& options)
+      ABSL_LOCKS_EXCLUDED(mu_);
+
+  /// What the import `request_id` gave, nullptr if there was none. Errors: INVALID_ARGUMENT REQUEST_ID_REUSED.
+  absl::StatusOr<std::shared_ptr<const ImportOutcome>> FindImport(absl::string_view request_id,
+                                                                  uint64_t fingerprint) const
+      ABSL_LOCKS_EXCLUDED(mu_);
+
+  /// FAILED_PRECONDITION SESSION_NOT_EMPTY unless the session is at revision 0.
+  absl::Status CheckEmpty() const ABSL_LOCKS_EXCLUDED(mu_);
+
+  /// Makes `mesh`, which is at revision 1, the content. Errors: as CheckEmpty; `mesh` is untouched then.
+  absl::Status Adopt(Mesh& mesh) ABSL_LOCKS_EXCLUDED(mu_);
+
+  void RememberImport(const std::string& request_id, uint64_t fingerprint,
+                      std::shared_ptr<const ImportOutcome> outcome) ABSL_LOCKS_EXCLUDED(mu_);
+
+  /// Ends the session and its followers; returns its last revision. An empty `etag` fits any.
+  /// Errors: ABORTED ETAG_MISMATCH; NOT_FOUND SESSION_DELETED.
+  absl::StatusOr<int64_t> Delete(absl::string_view etag) ABSL_LOCKS_EXCLUDED(mu_);
+
+  FollowerList& followers() { return followers_; }
+  DeltaSource& deltas() { return deltas_; }
+
+ private:
+  using AnswerPtr = std::shared_ptr<const BatchResult>;
+
+  std::string EtagAt(int64_t revision) const;
+  absl::Status CheckRevisions(const ApplyOptions& options) const ABSL_SHARED_LOCKS_REQUIRED(mu_);
+  absl::StatusOr<AnswerPtr> ApplyLocked(absl::Span<const Edit> edits, const ApplyOptions& options)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
+  absl::StatusOr<AnswerPtr> ApplyOnce(absl::Span<const Edit> edits, const ApplyOptions& options,
+                                      uint64_t fingerprint) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
+  absl::Status CheckEmptyLocked() const ABSL_SHARED_LOCKS_REQUIRED(mu_);
+  absl::Status CheckMemory(absl::Span<const Edit> edits) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
+  AnswerPtr Unchanged() const ABSL_SHARED_LOCKS_REQUIRED(mu_);
+  void Committed() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
+
+  const Options options_;
+  const uint64_t creation_id_;  ///< tells this session from an earlier one of the same name
+  const absl::Time create_time_;
+
+  mutable absl::Mutex mu_;
+  Mesh mesh_ ABSL_GUARDED_BY(mu_);
+  absl::Time commit_time_ ABSL_GUARDED_BY(mu_);
+  absl::Status gone_ ABSL_GUARDED_BY(mu_);  ///< not OK: deleted, or damaged by a failure half way
+  uint64_t items_since_check_ ABSL_GUARDED_BY(mu_) = 0;
+  AnswerMemory<BatchResult> answers_ ABSL_GUARDED_BY(mu_);
+  AnswerMemory<ImportOutcome> imports_ ABSL_GUARDED_BY(mu_);
+  std::atomic<int64_t> revision_{0};
+
+  mutable SummaryCache summary_;
+  FollowerList followers_;
+  DeltaSource deltas_;
+};
+
+using SessionPtr = std::shared_ptr<Session>;
+
+}  // namespace dynmesh
+
+#endif  // DYNMESH_SERVER_SESSION_SESSION_H_

@@ -1,0 +1,66 @@
+#include "server/session/session_errors.h"
+
+#include <string>
+
+#include "absl/strings/str_cat.h"
+#include "core/mesh/error.h"
+
+namespace dynmesh {
+
+absl::Status OutOfMemory() {
+  return MakeError(absl::StatusCode::kResourceExhausted, reason::kLimitExceeded, "the server is out of memory",
+                   {{"limit", "memory"}});
+}
+
+absl::Status ShuttingDown() {
+  return MakeError(absl::StatusCode::kUnavailable, reason::kShuttingDown, "the server is shutting down");
+}
+
+absl::Status CallCancelled() { return absl::CancelledError("the call was cancelled"); }
+
+absl::Status RevisionInFuture(int64_t requested, int64_t actual) {
+  return MakeError(absl::StatusCode::kOutOfRange, reason::kRevisionInFuture,
+                   absl::StrCat("revision ", requested, " is in the future: the session is at ", actual),
+                   {{"requested", absl::StrCat(requested)}, {"actual", absl::StrCat(actual)}});
+}
+
+absl::Status RevisionMismatch(int64_t expected, int64_t actual) {
+  return MakeError(absl::StatusCode::kAborted, reason::kRevisionMismatch,
+                   absl::StrCat("the session is at revision ", actual, ", not ", expected),
+                   {{"expected", absl::StrCat(expected)}, {"actual", absl::StrCat(actual)}});
+}
+
+absl::Status SessionNotFound(absl::string_view name) {
+  return MakeError(absl::StatusCode::kNotFound, reason::kSessionNotFound,
+                   absl::StrCat("there is no session ", name), {{"session", std::string(name)}});
+}
+
+absl::Status SessionDeleted(absl::string_view name) {
+  return MakeError(absl::StatusCode::kNotFound, reason::kSessionDeleted,
+                   absl::StrCat("session ", name, " has been deleted"), {{"session", std::string(name)}});
+}
+
+absl::Status SessionDamaged(absl::string_view name) {
+  return MakeError(absl::StatusCode::kDataLoss, reason::kInternal,
+                   absl::StrCat("an edit of session ", name, " failed half way; delete the session"),
+                   {{"session", std::string(name)}});
+}
+
+absl::Status SessionNotEmpty(absl::string_view name, int64_t revision) {
+  return FailedPrecondition(
+      reason::kSessionNotEmpty,
+      absl::StrCat("session ", name, " is at revision ", revision, ", and only a new one can be filled"),
+      {{"session", std::string(name)}, {"revision", absl::StrCat(revision)}});
+}
+
+absl::Status EtagMismatch(absl::string_view name, absl::string_view etag) {
+  return MakeError(absl::StatusCode::kAborted, reason::kEtagMismatch,
+                   absl::StrCat("session ", name, " has changed since that etag was given"),
+                   {{"session", std::string(name)}, {"etag", std::string(etag)}});
+}
+
+absl::Status BadField(absl::string_view field, absl::string_view message) {
+  return InvalidArgument(reason::kBadArgument, message, {{"field", std::string(field)}});
+}
+
+}  // namespace dynmesh

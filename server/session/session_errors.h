@@ -1,0 +1,47 @@
+#ifndef DYNMESH_SERVER_SESSION_SESSION_ERRORS_H_
+#define DYNMESH_SERVER_SESSION_SESSION_ERRORS_H_
+
+#include <cstdint>
+
+#include "absl/status/status.h"
+#include "absl/strings/string_view.h"
+
+/// The errors of sessions, each made in one place (reasons: core/mesh/error.h).
+namespace dynmesh {
+
+/// RESOURCE_EXHAUSTED LIMIT_EXCEEDED, limit "memory": the process could not get any more.
+absl::Status OutOfMemory();
+
+/// UNAVAILABLE SHUTTING_DOWN.
+absl::Status ShuttingDown();
+
+/// CANCELLED: the peer went away or its deadline passed.
+absl::Status CallCancelled();
+
+/// OUT_OF_RANGE REVISION_IN_FUTURE, metadata requested and actual.
+absl::Status RevisionInFuture(int64_t requested, int64_t actual);
+
+/// ABORTED REVISION_MISMATCH, metadata expected and actual.
+absl::Status RevisionMismatch(int64_t expected, int64_t actual);
+
+/// NOT_FOUND SESSION_NOT_FOUND.
+absl::Status SessionNotFound(absl::string_view name);
+
+/// NOT_FOUND SESSION_DELETED.
+absl::Status SessionDeleted(absl::string_view name);
+
+/// DATA_LOSS INTERNAL: an edit ended half way, so what the session holds is not to be trusted.
+absl::Status SessionDamaged(absl::string_view name);
+
+/// FAILED_PRECONDITION SESSION_NOT_EMPTY.
+absl::Status SessionNotEmpty(absl::string_view name, int64_t revision);
+
+/// ABORTED ETAG_MISMATCH, metadata etag: the present one.
+absl::Status EtagMismatch(absl::string_view name, absl::string_view etag);
+
+/// INVALID_ARGUMENT BAD_ARGUMENT, metadata field.
+absl::Status BadField(absl::string_view field, absl::string_view message);
+
+}  // namespace dynmesh
+
+#endif  // DYNMESH_SERVER_SESSION_SESSION_ERRORS_H_

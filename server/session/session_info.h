@@ -1,0 +1,80 @@
+#ifndef DYNMESH_SERVER_SESSION_SESSION_INFO_H_
+#define DYNMESH_SERVER_SESSION_SESSION_INFO_H_
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "absl/base/thread_annotations.h"
+#include "absl/synchronization/mutex.h"
+#include "absl/time/time.h"
+#include "absl/types/optional.h"
+#include "core/mesh/estimate.h"
+#include "core/mesh/mesh.h"
+
+namespace dynmesh {
+
+/// A number for each EntityKind.
+using KindCounts = std::array<uint64_t, kNumEntityKinds>;
+
+/// Smallest and largest coordinates.
+struct Box {
+  Point low;
+  Point high;
+};
+
+/// The box round the live vertices; nullopt without any. Cost: vertices.
+absl::optional<Box> BoundsOf(const Mesh& mesh);
+
+/// Settings of a session, fixed when it is created.
+struct SessionSettings {
+  DuplicatePolicy duplicates = DuplicatePolicy::kKeep;
+};
+
+/// What a session is and holds at one revision.
+struct SessionInfo {
+  std::string name;
+  int64_t revision = 0;
+  std::string etag;
+  SessionSettings settings;
+  absl::Time create_time;
+  absl::Time update_time;
+  KindCounts counts = {};
+  KindCounts estimated_counts = {};  ///< from counts[vertices] and the elements (paper, Table 1)
+  KindCounts boundary_counts = {};
+  KindCounts element_counts = {};
+  int64_t euler_characteristic = 0;
+  Checksum checksum;
+  uint64_t memory_bytes = 0;
+  uint32_t followers = 0;
+  std::vector<AttributeSpec> attributes;
+  absl::optional<Box> bounds;
+};
+
+/// The parts of SessionInfo that take a scan of the mesh.
+struct MeshSummary {
+  absl::optional<Box> bounds;
+  KindCounts estimated_counts = {};
+};
+
+/// The summary of a session's mesh, scanned at most once for each revision.
+///
+/// Thread safety: full.
+class SummaryCache {
+ public:
+  /// REQUIRES: `mesh` does not change during the call. Cost: slots, when its revision is new.
+  MeshSummary Of(const Mesh& mesh);
+
+ private:
+  absl::Mutex mu_;
+  int64_t revision_ ABSL_GUARDED_BY(mu_) = -1;
+  MeshSummary summary_ ABSL_GUARDED_BY(mu_);
+};
+
+/// The parts that `mesh` knows: counts, checksum, attributes, memory and `summary`.
+SessionInfo DescribeMesh(const Mesh& mesh, const MeshSummary& summary);
+
+}  // namespace dynmesh
+
+#endif  // DYNMESH_SERVER_SESSION_SESSION_INFO_H_

@@ -1,0 +1,117 @@
+"""Hostile arguments are refused by name, here or by the server, and change nothing."""
+
+import dynmesh
+import numpy as np
+import pytest
+from dynmesh import arrays, kinds
+from dynmesh.edit import EditBatch
+from hypothesis import given
+from hypothesis import strategies as st
+from shapes import TET
+
+
+@pytest.mark.parametrize("ids", [[-1], [2**32], [0.5], ["a"], [[1, 2]], [True], 3, [None]])
+def test_ids_are_a_row_of_integers_below_2_to_the_32(ids):
+    with pytest.raises(dynmesh.InvalidArgumentError):
+        arrays.as_ids(ids)
+
+
+def test_a_bad_id_is_named_by_its_index():
+    with pytest.raises(dynmesh.InvalidArgumentError) as caught:
+        arrays.as_ids([4, 5, -1])
+    assert caught.value.metadata == {"index": "2"}
+
+
+@given(st.lists(st.integers(0, 2**32 - 1)))
+def test_ids_survive_the_wire(ids):
+    assert arrays.from_bytes(arrays.u32_bytes(arrays.as_ids(ids)), "<u4").tolist() == ids
+
+
+@pytest.mark.parametrize(
+    "points", [[[0, 0]], [1, 2, 3], [[[1, 2, 3]]], [["a", "b", "c"]], [[1j, 0, 0]], [[0, 0, 0], [1]]]
+)
+def test_points_are_rows_of_three_reals(points):
+    with pytest.raises(dynmesh.InvalidArgumentError):
+        arrays.as_points(points)
+
+
+def test_single_precision_points_are_widened_exactly():
+    points = np.array([[0.1, 0.2, 0.3]], dtype=np.float32)
+    assert (arrays.as_points(points) == points).all()
+
+
+@pytest.mark.parametrize("name", ["tri", "", 4, None, "vertex"])
+def test_unknown_element_types_are_refused(name):
+    with pytest.raises(dynmesh.InvalidArgumentError, match="BAD_ELEMENT_TYPE"):
+        kinds.as_element_type(name)
+
+
+@pytest.mark.parametrize("kind", ["Vertex", "", 1, None])
+def test_unknown_kinds_are_refused(kind):
+    with pytest.raises(dynmesh.InvalidArgumentError, match="BAD_ENTITY_KIND"):
+        kinds.as_kind(kind)
+
+
+def test_rows_of_elements_must_have_the_width_of_their_type():
+    with pytest.raises(dynmesh.InvalidArgumentError, match="BAD_ARRAY_LENGTH"):
+        EditBatch().add_elements("tetra", [[0, 1, 2]])
+
+
+def test_positions_and_ids_must_be_as_many():
+    with pytest.raises(dynmesh.InvalidArgumentError, match="BAD_ARRAY_LENGTH"):
+        EditBatch().move_vertices([0, 1], [[0, 0, 0]])
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_positions_that_are_not_finite_are_refused_by_index(session, bad):
+    with pytest.raises(dynmesh.InvalidArgumentError) as caught:
+        with session.edit() as tx:
+            tx.add_vertices([[0, 0, 0], [0, bad, 0]])
+    assert caught.value.reason == "NON_FINITE_VALUE"
+    assert caught.value.metadata["edit"] == "0" and caught.value.metadata["index"] == "1"
+    assert session.revision == 0
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_an_import_that_is_not_finite_is_refused(session, bad):
+    with pytest.raises(dynmesh.InvalidArgumentError, match="NON_FINITE_VALUE"):
+        session.import_mesh([[0, 0, bad]], {})
+    assert session.info().counts == (0, 0, 0, 0)
+
+
+def test_an_import_whose_elements_name_no_vertex_is_refused(session):
+    with pytest.raises(dynmesh.DynmeshError) as caught:
+        session.import_mesh(TET, {"tetra": [[0, 1, 2, 4]]})
+    assert isinstance(caught.value, ValueError) or isinstance(caught.value, LookupError)
+    assert session.revision == 0
+
+
+def test_ids_that_never_existed_are_not_found(session):
+    session.import_mesh(TET, {"tetra": [[0, 1, 2, 3]]})
+    for call in (
+        lambda: session.positions([4]),
+        lambda: session.neighbors("cell", "vertex", [0, 2**32 - 1]),
+        lambda: session.entities("edge", [6]),
+    ):
+        with pytest.raises(dynmesh.NotFoundError) as caught:
+            call()
+        assert caught.value.reason == "UNKNOWN_ENTITY" and len(caught.value.ids) == 1
+
+
+@pytest.mark.parametrize("ids", [slice(0, 10, 2), slice(-3, None), slice(None, -1)])
+def test_slices_are_plain_ranges_of_ids(session, ids):
+    with pytest.raises(dynmesh.InvalidArgumentError):
+        session.neighbors("vertex", "cell", ids)
+
+
+def test_cells_have_no_boundary(session):
+    with pytest.raises(dynmesh.InvalidArgumentError, match="BAD_ENTITY_KIND"):
+        session.boundary("cell")
+
+
+def test_handles_without_a_vertex_are_refused(session):
+    with pytest.raises(dynmesh.DynmeshError):
+        with session.edit() as tx:
+            handles = tx.add_vertices(TET)
+            tx.add_elements("tetra", [np.append(handles[:3], handles[3] + 1)])
+    assert session.revision == 0

@@ -1,0 +1,175 @@
+"""The command, as a shell sees it."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+
+import meshio
+import numpy as np
+import pytest
+from shapes import two_tets, zoo
+
+COMMAND = (
+    [os.environ["DYNMESH_COMMAND"]] if "DYNMESH_COMMAND" in os.environ else [sys.executable, "-m", "dynmesh"]
+)
+
+
+@pytest.fixture
+def run(daemon):
+    """Runs a command to its end and gives its exit code, stdout and stderr."""
+
+    def call(*args: object, target: str = daemon.target) -> subprocess.CompletedProcess[str]:
+        environment = {**os.environ, "DYNMESH_TARGET": target}
+        return subprocess.run(
+            [*COMMAND, *map(str, args)],
+            env=environment,
+            capture_output=True,
+            text=True,
+            timeout=60,
+            check=False,
+            stdin=subprocess.DEVNULL,
+        )
+
+    return call
+
+
+@pytest.fixture
+def mesh_file(tmp_path):
+    """A file of two tetrahedra."""
+    meshio.write(tmp_path / "tets.vtu", two_tets())
+    return tmp_path / "tets.vtu"
+
+
+def test_a_mesh_through_the_command_and_out_again(run, mesh_file, tmp_path):
+    created = run("create", "cli", mesh_file, "--json")
+    assert created.returncode == 0, created.stderr
+    assert json.loads(created.stdout)["counts"] == {"vertices": 5, "edges": 9, "faces": 7, "cells": 2}
+    assert created.stderr == ""
+    listed = json.loads(run("ls", "--json").stdout)
+    assert [info["name"] for info in listed] == ["cli"]
+    exported = json.loads(run("--json", "export", "cli", tmp_path / "out.vtu").stdout)
+    assert exported["revision"] == 1 and exported["tetra"] == 2
+    assert (meshio.read(tmp_path / "out.vtu").cells[0].data == two_tets().cells[0].data).all()
+    assert json.loads(run("rm", "cli", "--json").stdout) == {"name": "cli", "revision": 1}
+    assert json.loads(run("ls", "--json").stdout) == []
+
+
+def test_output_for_humans(run, mesh_file):
+    assert "2" in run("create", "human", mesh_file).stdout
+    assert "human" in run("ls").stdout
+    text = run("info", "human").stdout
+    assert "checksum" in text and "boundary" in text and "(0 0 0) to (1 1 1)" in text
+    assert run("rm", "human").stdout == "deleted human at revision 1\n"
+
+
+def test_import_fills_an_empty_session_once(run, mesh_file):
+    assert run("create", "later").returncode == 0
+    assert run("import", "later", mesh_file).returncode == 0
+    again = run("import", "later", mesh_file)
+    assert again.returncode == 1 and "SESSION_NOT_EMPTY" in again.stderr
+    run("rm", "later")
+
+
+def test_warnings_of_the_mesh_are_on_stderr(run, tmp_path):
+    meshio.write(tmp_path / "zoo.vtu", zoo())
+    created = run("create", "zoo", tmp_path / "zoo.vtu", "--json", "--attributes", "")
+    assert created.returncode == 0 and "DEGENERATE_ELEMENT" in created.stderr
+    assert json.loads(created.stdout)["element_counts"]["cells"] == 4
+    run("rm", "zoo")
+
+
+def test_a_file_that_cannot_be_read_makes_no_session(run, tmp_path):
+    (tmp_path / "bad.vtu").write_text("nonsense")
+    for file, why in ((tmp_path / "bad.vtu", "cannot read"), (tmp_path / "none.vtu", "no such file")):
+        created = run("create", "bad", file)
+        assert created.returncode == 1 and why in created.stderr
+        assert created.stderr.count("\n") == 1 and "Traceback" not in created.stderr
+    assert run("info", "bad").returncode == 1
+
+
+def test_a_mesh_that_is_refused_makes_no_session(run, tmp_path):
+    mesh = two_tets()
+    mesh.point_data = {"big": np.full(5, 2**40)}
+    meshio.write(tmp_path / "big.vtu", mesh)
+    created = run("create", "refused", tmp_path / "big.vtu")
+    assert created.returncode == 1 and "'big'" in created.stderr
+    assert run("info", "refused").returncode == 1
+    assert run("create", "refused", tmp_path / "big.vtu", "--attributes", "").returncode == 0
+    run("rm", "refused")
+
+
+def test_errors_are_one_line_with_the_reason(run):
+    missing = run("info", "nobody")
+    assert (missing.returncode, missing.stdout) == (1, "")
+    assert missing.stderr.startswith("dynmesh: ") and missing.stderr.endswith("[SESSION_NOT_FOUND]\n")
+    unreachable = run("ls", target="unix:/nonexistent/socket")
+    assert unreachable.returncode == 1 and unreachable.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    "args", [(), ("frobnicate",), ("info",), ("ls", "--what"), ("watch", "a", "--codec", "zip")]
+)
+def test_wrong_usage_is_2(run, args):
+    assert run(*args).returncode == 2
+
+
+def test_help_is_there_for_every_command(run):
+    for command in ("serve", "create", "import", "export", "ls", "info", "watch", "rm"):
+        shown = run(command, "--help")
+        assert shown.returncode == 0 and "usage: dynmesh" in shown.stdout
+
+
+def test_watch_prints_a_line_for_each_step(daemon, client, run):
+    session = client.create_session("watched")
+    session.import_mesh(two_tets())
+    command = [*COMMAND, "--target", daemon.target, "watch", "watched", "--json", "--count", "2"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        first = json.loads(process.stdout.readline())
+        assert first["revision"] == 1 and first["vertices"] == 5 and first["elements"]["cells"] == 2
+        with session.edit() as tx:
+            tx.remove_elements("cell", [0])
+        second = json.loads(process.stdout.readline())
+        assert (second["from_revision"], second["revision"], second["removed_elements"]) == (1, 2, 1)
+        assert second["checksum"] == str(tx.result.checksum)
+        assert process.wait(20) == 0
+    line = run("watch", "watched", "--count", 1).stdout
+    assert line.startswith("revision      2  ") and line.endswith("now 5 vertices, 1 cells\n")
+    session.delete()
+
+
+def test_watching_can_be_interrupted(daemon, client):
+    session = client.create_session("interrupted")
+    session.import_mesh(two_tets())
+    command = [*COMMAND, "--target", daemon.target, "watch", "interrupted"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout.readline().startswith("revision")
+        process.send_signal(signal.SIGINT)
+        assert process.wait(20) == 0 and process.stderr.read() == ""
+    session.delete()
+
+
+def test_serve_becomes_the_daemon(tmp_path):
+    socket, ready = tmp_path / "socket", tmp_path / "ready"
+    command = [*COMMAND, "serve", "--listen=", f"--unix_socket={socket}", f"--ready_file={ready}"]
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+        listing = [*COMMAND, "ls", "--json", "--target", f"unix:{socket}"]
+        try:
+            for _ in range(100):  # each try takes a while by itself
+                tried = subprocess.run(listing, capture_output=True, text=True, check=False, timeout=60)
+                if tried.returncode == 0:
+                    break
+            assert tried.stdout == "[]\n"
+        finally:
+            process.send_signal(signal.SIGTERM)
+            assert process.wait(20) == 0
+
+
+def test_output_that_nobody_reads_is_no_error(daemon, client):
+    command = [*COMMAND, "--target", daemon.target, "ls"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        process.stdout.close()
+        assert process.wait(30) == 0 and process.stderr.read() == ""

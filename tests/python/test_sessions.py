@@ -1,0 +1,117 @@
+"""Sessions by name: making, listing, describing, filling and deleting them."""
+
+import dynmesh
+import numpy as np
+import pytest
+from shapes import TET, grid_tets, two_tets, zoo
+
+
+def test_a_new_session_is_empty_at_revision_0(session):
+    info = session.info()
+    assert (info.name, info.revision, info.counts) == (session.name, 0, (0, 0, 0, 0))
+    assert info.bounds is None and info.checksum == (0, 0) and info.duplicates == "keep"
+
+
+def test_info_describes_what_was_imported(session):
+    session.import_mesh(two_tets())
+    info = session.info()
+    assert info.revision == 1 and info.counts == (5, 9, 7, 2)
+    assert info.element_counts.cells == 2 and info.boundary_counts == (5, 9, 6, 0)
+    assert info.euler_characteristic == 1
+    assert info.bounds.tolist() == [[0, 0, 0], [1, 1, 1]]
+    assert session.counts == info.counts
+
+
+def test_sessions_are_listed_by_name_over_pages(client, monkeypatch):
+    monkeypatch.setattr("dynmesh.client._PAGE_SIZE", 3)
+    names = [f"page-{i}" for i in range(8)]
+    made = [client.create_session(name) for name in reversed(names)]
+    assert [info.name for info in client.sessions() if info.name.startswith("page-")] == names
+    for session in made:
+        session.delete()
+
+
+def test_creating_twice_with_one_request_id_is_creating_once(client):
+    client.create_session("twice", request_id="r")
+    client.create_session("twice", request_id="r").delete()
+
+
+def test_a_deleted_session_is_gone(client):
+    session = client.create_session("gone")
+    session.import_mesh(TET, {})
+    assert client.delete_session("gone") == 1
+    with pytest.raises(dynmesh.NotFoundError):
+        session.info()
+
+
+def test_deleting_with_an_old_etag_is_aborted(client, session):
+    etag = session.info().etag
+    session.import_mesh(TET, {})
+    with pytest.raises(dynmesh.AbortedError, match="ETAG_MISMATCH"):
+        client.delete_session(session.name, etag=etag)
+
+
+def test_an_import_gives_ids_in_the_callers_order(session):
+    mesh = zoo()
+    result = session.import_mesh(mesh)
+    assert result.revision == 1 and result.info.counts.cells == 4
+    assert (session.positions() == mesh.points).all()
+    cells = session.entities("cell")
+    assert cells.types.tolist() == [7, 5, 6, 4]
+    assert cells.vertices[:8].tolist() == list(range(8))
+
+
+def test_an_import_warns_of_degenerate_and_duplicate_elements(session):
+    reasons = {w.reason: w.count for w in session.import_mesh(zoo()).warnings}
+    assert reasons == {"DEGENERATE_ELEMENT": 1, "DUPLICATE_ELEMENT": 1}
+
+
+def test_duplicates_can_be_refused(client):
+    session = client.create_session("strict", duplicates="refuse")
+    with pytest.raises(dynmesh.InvalidArgumentError, match="DUPLICATE_ELEMENT"):
+        session.import_mesh(TET, [("tetra", [[0, 1, 2, 3], [1, 2, 0, 3]])])
+    assert session.revision == 0
+    session.delete()
+    with pytest.raises(dynmesh.InvalidArgumentError):
+        client.create_session("odd", duplicates="sometimes")
+
+
+def test_only_an_empty_session_can_be_filled(session):
+    session.import_mesh(TET, {})
+    with pytest.raises(dynmesh.FailedPreconditionError, match="SESSION_NOT_EMPTY"):
+        session.import_mesh(TET, {})
+
+
+def test_a_validated_import_leaves_the_session_empty(session):
+    result = session.import_mesh(two_tets(), validate_only=True)
+    assert result.info.counts == (5, 9, 7, 2)
+    assert session.info().counts == (0, 0, 0, 0) and session.revision == 0
+
+
+def test_a_mesh_of_many_chunks_comes_back_as_it_went(session):
+    mesh = grid_tets(24)  # 15,625 points and 82,944 tetrahedra: beyond a megabyte
+    session.import_mesh(mesh, progress=False)
+    snapshot = session.snapshot()
+    assert (snapshot.positions == mesh.points).all()
+    assert (snapshot.blocks[0].vertices == mesh.cells[0].data).all()
+    assert snapshot.checksum() == session.info().checksum
+
+
+def test_an_empty_session_exports_nothing(session):
+    snapshot = session.snapshot()
+    assert snapshot.revision == 0 and snapshot.positions.shape == (0, 3) and snapshot.blocks == ()
+    assert len(snapshot.to_meshio().points) == 0
+
+
+def test_progress_is_shown_when_asked_for_and_only_then(session, capsys):
+    session.import_mesh(two_tets())
+    assert capsys.readouterr().err == ""
+    session.snapshot(progress=True)
+    assert "exporting" in capsys.readouterr().err
+
+
+def test_points_of_the_plane_get_a_z_of_zero(session):
+    mesh = two_tets()
+    mesh.points, mesh.cells = mesh.points[:3, :2].astype(np.float32), []
+    session.import_mesh(mesh)
+    assert session.positions().tolist() == [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
