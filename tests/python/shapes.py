@@ -26,8 +26,11 @@ def two_tets() -> meshio.Mesh:
 
 
 def zoo() -> meshio.Mesh:
-    """Every type of element: a hexahedron with a pyramid, a prism and a tetrahedron on it, a dangling quad and
-    triangle, a wire edge, an isolated vertex, a duplicate triangle and a degenerate one."""
+    """Every type of element, in meshio's node order.
+
+    A hexahedron with a pyramid, a prism and a tetrahedron on it; a dangling quad and triangle, two wire edges
+    and an isolated vertex; a duplicate triangle and a degenerate one.
+    """
     points = np.array(
         [
             [0, 0, 0],

@@ -63,6 +63,8 @@ def test_output_for_humans(run, mesh_file):
     assert "human" in run("ls").stdout
     text = run("info", "human").stdout
     assert "checksum" in text and "boundary" in text and "(0 0 0) to (1 1 1)" in text
+    written = run("export", "human", mesh_file.with_name("out.vtk")).stdout
+    assert written.endswith("out.vtk at revision 1: 5 vertices, 2 tetra\n")
     assert run("rm", "human").stdout == "deleted human at revision 1\n"
 
 

@@ -98,9 +98,12 @@ def test_it_outlives_the_thread_that_launched_it():
         assert list(daemon.client.sessions()) == []
 
 
-def test_it_ends_with_the_process_that_launched_it():
+def test_it_ends_with_the_process_that_launched_it(tmp_path):
     code = "import dynmesh, os; d = dynmesh.launch(); print(d.pid, flush=True); os.kill(os.getpid(), 9)"
-    run = subprocess.run([sys.executable, "-c", code], stdout=subprocess.PIPE, check=False, timeout=60)
+    environment = {**os.environ, "TMPDIR": str(tmp_path)}  # whoever is killed leaves its directory behind
+    run = subprocess.run(
+        [sys.executable, "-c", code], stdout=subprocess.PIPE, check=False, timeout=60, env=environment
+    )
     pid = int(run.stdout)
     assert run.returncode == -signal.SIGKILL
     wait_until_gone(pid)

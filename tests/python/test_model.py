@@ -8,6 +8,7 @@ import dynmesh
 import numpy as np
 import pytest
 from dynmesh import ElementType, EntityKind
+from dynmesh.delta import HAS_NATIVE
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import (
@@ -22,6 +23,7 @@ from model import Model, Oracle
 
 KINDS = ("vertex", "edge", "face", "cell")
 WAIT_S = 30
+CODECS = ("auto", "draco", "zstd", "raw") if HAS_NATIVE else ("auto", "raw")
 coordinate = st.floats(-1e6, 1e6)
 point = st.tuples(coordinate, coordinate, coordinate)
 _names = itertools.count()
@@ -32,7 +34,7 @@ class SessionMachine(RuleBasedStateMachine):
 
     client: dynmesh.Client
 
-    @initialize(codec=st.sampled_from(["auto", "draco", "zstd", "raw"]))
+    @initialize(codec=st.sampled_from(CODECS))
     def begin(self, codec):
         self.session = self.client.create_session(f"model-{next(_names)}")
         self.mirror = self.session.mirror(codec=codec)
@@ -182,4 +184,7 @@ class SessionMachine(RuleBasedStateMachine):
 
 def test_random_edits_leave_everybody_agreed(client):
     SessionMachine.client = client
-    run_state_machine_as_test(SessionMachine, settings=settings(max_examples=2 * settings.default.max_examples, stateful_step_count=30))
+    run_state_machine_as_test(
+        SessionMachine,
+        settings=settings(max_examples=2 * settings.default.max_examples, stateful_step_count=30),
+    )

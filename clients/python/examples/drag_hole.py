@@ -97,7 +97,7 @@ def _demonstrate(args: argparse.Namespace, daemon: dynmesh.Daemon, mesh: meshio.
     checks = Checks()
     end = survey(session.snapshot(progress=False), run.start.flipped)
     _check(checks, run, end, is_plate=args.mesh is None)
-    _write_surface(args.output_dir, run, region)
+    _write_surface(args.output_dir, run, end, region)
     return checks.exit_code()
 
 
@@ -258,15 +258,14 @@ def _check(checks: Checks, run: Run, end: Survey, is_plate: bool) -> None:
         checks.add(not broken, "the server's data structure is sound", "; ".join(broken[:3]))
 
 
-def _write_surface(directory: Path, run: Run, region: Region | None) -> None:
+def _write_surface(directory: Path, run: Run, end: Survey, region: Region | None) -> None:
     surface = picture.read_surface(run.session)
     if surface is None:
         print("\nthe mesh has no surface to write")
         return
-    info = run.session.info()
-    caption = (f"{info.counts.vertices:,} vertices, {run.start.num_elements:,} elements; {len(run.steps)} batches of "
-               f"{sum(step.items for step in run.steps):,} edits; "
-               f"{sum(step.inverted for step in run.steps):,} inversions repaired")  # fmt: skip
+    items = sum(step.items for step in run.steps)
+    caption = (f"{run.start.num_elements:,} elements became {end.num_elements:,} in {len(run.steps)} batches "
+               f"of {items:,} edits")  # fmt: skip
     picture.write_vtu(directory / "drag_hole.vtu", surface)
     picture.draw(directory / "drag_hole.png", surface, region, caption)
     print(f"\nwrote {directory / 'drag_hole.png'} and {directory / 'drag_hole.vtu'}")

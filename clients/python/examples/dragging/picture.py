@@ -18,15 +18,17 @@ from dynmesh import Session
 from matplotlib import pyplot
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import Normalize
+from PIL import Image
 
 from .elements import Floats, Ints
 from .region import Region
 
-_SIZE_INCHES = (12.0, 6.75)
+_SIZE_INCHES = (12.0, 6.0)
 _DPI = 100
+_COLOURS = 128  # in the file: a quarter of its size in full colour
 _MOST_OUTLINED = 40000  # faces: beyond, the lines between them would hide the colours
 _OLD = np.array([0.80, 0.82, 0.85])
-_LIGHT = np.array([0.35, 0.45, 0.82])  # towards the light, in the frame of the camera
+_LIGHT = np.array([0.30, 0.35, 0.89])  # towards the light, in the frame of the camera
 
 
 @dataclass(frozen=True)
@@ -84,20 +86,28 @@ def draw(path: Path, surface: Surface, region: Region | None, caption: str) -> N
     seen = surface.points @ camera.T
     depth = seen[surface.corners][..., 2].mean(axis=1)
     order = np.argsort(depth)
-    figure, axes = pyplot.subplots(figsize=_SIZE_INCHES, dpi=_DPI)
+    figure = pyplot.figure(figsize=_SIZE_INCHES, dpi=_DPI)
+    axes = figure.add_axes((0.01, 0.11, 0.98, 0.82))
     colours, scale = _colours(surface, seen)
     outlined = len(order) <= _MOST_OUTLINED
     axes.add_collection(PolyCollection(
         seen[surface.corners[order]][..., :2], facecolors=colours[order],
         edgecolors=np.clip(colours[order] - 0.22, 0, 1) if outlined else colours[order],
-        linewidths=0.25, antialiaseds=True))  # fmt: skip
+        linewidths=0.3, antialiaseds=True))  # fmt: skip
     if region is not None:
         _draw_path(axes, region, camera, seen)
     _frame(axes, seen)
-    bar = figure.colorbar(scale, ax=axes, orientation="horizontal", fraction=0.035, pad=0.02, aspect=60)
-    bar.set_label("revision at which a face came to be (grey: the import)", fontsize=9)
-    figure.suptitle(caption, fontsize=11, y=0.97)
-    figure.savefig(path)
+    bar = figure.colorbar(scale, cax=figure.add_axes((0.2, 0.075, 0.6, 0.02)), orientation="horizontal")
+    bar.set_label("revision at which a face came to be (grey: with the import)", fontsize=9, labelpad=1)
+    bar.ax.tick_params(labelsize=8)
+    figure.text(0.5, 0.95, caption, ha="center", fontsize=11)
+    _save(path, figure)
+
+
+def _save(path: Path, figure: pyplot.Figure) -> None:
+    figure.canvas.draw()
+    image = Image.fromarray(np.asarray(figure.canvas.buffer_rgba())[..., :3])
+    image.quantize(_COLOURS, dither=Image.Dither.NONE).save(path, optimize=True)
     pyplot.close(figure)
 
 
@@ -109,7 +119,7 @@ def _camera(surface: Surface, region: Region | None) -> Floats:
     right, thin = axes[0] * np.sign(axes[0][np.abs(axes[0]).argmax()]), axes[2]
     to_region = region.path(1.0) - middle if region is not None else np.zeros(3)
     eye = thin * (1.0 if thin @ to_region > 0 or thin.sum() > 0 else -1.0)
-    eye = eye - 0.55 * np.cross(eye, right) + 0.12 * right
+    eye = eye - 0.7 * np.cross(eye, right) - 0.15 * right
     eye /= np.linalg.norm(eye)
     right = right - (right @ eye) * eye
     right /= np.linalg.norm(right)
@@ -124,7 +134,7 @@ def _colours(surface: Surface, seen: Floats) -> tuple[Floats, pyplot.cm.ScalarMa
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
     normals *= np.where(normals[:, 2:] < 0, -1, 1)  # towards the eye
     light = _LIGHT / np.linalg.norm(_LIGHT)
-    return np.clip(base * (0.45 + 0.6 * np.clip(normals @ light, 0, 1))[:, None], 0, 1), scale
+    return np.clip(base * (0.5 + 0.55 * np.clip(normals @ light, 0, 1))[:, None], 0, 1), scale
 
 
 def _draw_path(axes: pyplot.Axes, region: Region, camera: Floats, seen: Floats) -> None:

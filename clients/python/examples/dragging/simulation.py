@@ -20,7 +20,7 @@ from .patch import Block, Change, Patch, Sent, fill_batch, read_patch
 from .region import Region
 from .survey import Survey
 
-_MOST_REPAIRS = 800  # tried in one step
+_MOST_REPAIRS = 600  # tried in one step
 _MOST_ATTEMPTS = 8  # at a step, each holding more vertices back
 
 _SIMPLEX = {EntityKind.CELL: ElementType.TETRAHEDRON, EntityKind.FACE: ElementType.TRIANGLE}

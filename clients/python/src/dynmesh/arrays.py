@@ -17,7 +17,7 @@ CHUNK_BYTES = 1 << 20
 
 
 def as_ids(values: ArrayLike, what: str = "ids") -> Ids:
-    """`values` as uint32[n]. Raises `InvalidArgumentError` for anything that is not a row of such integers."""
+    """`values` as uint32[n]. Raises `InvalidArgumentError` for anything but a row of such integers."""
     return _as_uint32(values, what, ndim=1)
 
 

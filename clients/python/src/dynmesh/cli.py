@@ -160,14 +160,14 @@ def _import(args: argparse.Namespace) -> None:
 def _export(args: argparse.Namespace) -> None:
     with _client(args) as client:
         snapshot = client.session(args.name).export(args.file, slots=not args.no_slots)
-    elements = {block.type.meshio_name: len(block.ids) for block in snapshot.blocks}
-    report = {
-        "file": args.file,
-        "revision": snapshot.revision,
-        "vertices": len(snapshot.vertex_ids),
-        **elements,
-    }
-    _print(args, report, ", ".join(f"{key} {value}" for key, value in report.items()))
+    counts = {"vertices": len(snapshot.vertex_ids)}
+    counts |= {block.type.meshio_name: len(block.ids) for block in snapshot.blocks}
+    contents = ", ".join(f"{count} {name}" for name, count in counts.items())
+    _print(
+        args,
+        {"file": args.file, "revision": snapshot.revision, **counts},
+        f"wrote {args.file} at revision {snapshot.revision}: {contents}",
+    )
 
 
 def _ls(args: argparse.Namespace) -> None:

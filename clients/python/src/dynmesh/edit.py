@@ -119,8 +119,10 @@ class EditBatch:
         return self._append(add_elements=block)
 
     def remove_elements(self, kind: KindLike, ids: ArrayLike) -> int:
-        """Removes elements (uint32[n]) of a kind; faces and edges that only they needed go with them, vertices
-        stay. Returns the edit's index."""
+        """Removes elements (uint32[n]) of a kind; returns the edit's index.
+
+        Faces and edges that only they needed go with them, vertices stay.
+        """
         remove = edits_pb2.RemoveElements(kind=int(as_kind(kind)), ids=u32_bytes(as_ids(ids)))
         return self._append(remove_elements=remove)
 

@@ -51,8 +51,8 @@ def from_arrays(points: ArrayLike, cells: Cells) -> MeshData:
     ----------
     points : float[n, 3]
     cells : mapping or iterable of (type, int[m, k])
-        Blocks of elements by meshio's names ("tetra", "wedge", ...) or ours ("tetrahedron", "prism"); nodes in
-        VTK's order, that of wedges too, where a `meshio.Mesh` has another.
+        Blocks of elements by meshio's names ("tetra", "wedge", ...) or ours ("tetrahedron", "prism").
+        Nodes are in VTK's order, those of wedges too, where a `meshio.Mesh` has another.
     """
     items = cells.items() if isinstance(cells, Mapping) else cells
     return MeshData(as_points(points, "points"), [_block(name, rows) for name, rows in items])

@@ -16,16 +16,14 @@ class Progress:
         What the bar says before anything is known.
     show : bool, optional
         Default: whether stderr is a terminal.
-    total : int, optional
-        Number of items to come.
     """
 
-    def __init__(self, what: str, show: bool | None = None, total: int | None = None) -> None:
+    def __init__(self, what: str, show: bool | None = None) -> None:
         self._bar: Any = None
         if sys.stderr.isatty() if show is None else show:
             from tqdm import tqdm
 
-            self._bar = tqdm(desc=what, total=total, unit="", unit_scale=True, leave=False, file=sys.stderr)
+            self._bar = tqdm(desc=what, unit="", unit_scale=True, leave=False, file=sys.stderr)
 
     def __enter__(self) -> Progress:
         return self
@@ -35,6 +33,11 @@ class Progress:
     ) -> None:
         if self._bar is not None:
             self._bar.close()
+
+    @property
+    def shown(self) -> bool:
+        """Whether there is a bar."""
+        return self._bar is not None
 
     def set(self, phase: str, done: int, total: int) -> None:
         """Shows `done` of `total` (0: not known) items of `phase`."""

@@ -51,7 +51,7 @@ class Session(SessionReader):
         return f"<dynmesh.Session {self.name!r}>"
 
     def validate(self, *, timeout: float | None = None) -> list[str]:
-        """Broken invariants of the server's data structure; empty when it is sound. Slow: a tool for tests."""
+        """Broken invariants of the server's data structure; empty when it is sound. Slow."""
         request = sessions_pb2.ValidateSessionRequest(session=self.name)
         reply = self._caller.unary(self._sessions.ValidateSession, request, timeout, repeatable=True)
         return list(reply.violations)
@@ -196,8 +196,8 @@ class Session(SessionReader):
         Parameters
         ----------
         codec : "auto", "draco", "zstd" or "raw"
-            How deltas are packed; "auto": whatever is smallest. Without dynmesh's native module only "raw" can be
-            decoded, and is what "auto" means.
+            How deltas are packed; "auto": whatever is smallest. Without dynmesh's native module only "raw"
+            can be decoded, and is what "auto" means.
         position_bits : int
             0: positions are exact. 1-30: on a grid of that many bits for each axis; such a mirror proves its
             topology only.

@@ -129,6 +129,9 @@ class SessionReader:
         reader = ExportReader()
         request = sessions_pb2.ExportMeshRequest(session=self.name)
         with Progress("exporting", progress) as bar:
+            if bar.shown:
+                info = self.info()
+                bar.set("exporting", 0, info.counts.vertices + sum(info.element_counts))
             for reply in self._caller.stream(
                 self._sessions.ExportMesh, request, FOREVER if timeout is None else timeout
             ):
@@ -150,7 +153,7 @@ class SessionReader:
         progress: bool | None = None,
         timeout: float | None = None,
     ) -> Snapshot:
-        """Writes everything to a file in whatever format meshio knows by its name; returns what was written."""
+        """Writes everything to a file, in the format that its name implies; returns what was written."""
         snapshot = self.snapshot(progress=progress, timeout=timeout)
         snapshot.write(path, file_format, slots=slots)
         return snapshot

@@ -76,8 +76,10 @@ class Snapshot:
 
         Vertices are numbered densely in order of their ids; there is one block for each type, in order of
         `ElementType`, with its elements by id. Degenerate and duplicate elements stay, isolated vertices
-        too. Wedges are in meshio's node order (gmsh's, not VTK's). An attribute of one kind has zeros in the blocks of other kinds, which is what the server holds
-        for rows never set; attributes of derived faces and edges have no place in meshio and are left out.
+        too. Wedges are in meshio's node order (gmsh's, not VTK's).
+
+        An attribute of one kind has zeros in the blocks of other kinds, which is what the server holds for
+        rows never set; attributes of derived faces and edges have no place in meshio and are left out.
         Attributes of the same name and different shape on two kinds are called ``name:kind``.
 
         Parameters
