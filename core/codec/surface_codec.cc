@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <iterator>
 #include <new>
 
@@ -39,9 +40,10 @@ absl::Status OutOfMemory() {
                    "memory ran out in the surface codec", {{"limit", "memory"}});
 }
 
-// float32 is what a .drc file holds, so a position must be finite as one.
+// float32 is what a .drc file holds; Draco also subtracts and doubles, and overflows into wild writes.
 bool FitsFloat(const Point& p) {
-  return std::all_of(p.begin(), p.end(), [](double x) { return std::isfinite(static_cast<float>(x)); });
+  constexpr double kLargest = std::numeric_limits<float>::max() / 4;
+  return std::all_of(p.begin(), p.end(), [](double x) { return std::abs(x) <= kLargest; });
 }
 
 absl::Status CheckSurface(const TriangleSurface& surface, int position_bits) {
@@ -52,7 +54,7 @@ absl::Status CheckSurface(const TriangleSurface& surface, int position_bits) {
     return InvalidArgument(reason::kBadArrayLength, "positions are not one for each vertex");
   }
   if (!std::all_of(surface.positions.begin(), surface.positions.end(), FitsFloat)) {
-    return InvalidArgument(reason::kNonFinite, "a position is not finite as float32");
+    return InvalidArgument(reason::kNonFinite, "a position is too large for float32");
   }
   for (size_t i = 0; i < surface.triangles.size(); ++i) {
     const Triangle& t = surface.triangles[i];

@@ -25,12 +25,11 @@ struct TriangleSurface {
 ///
 /// Degenerate triangles and vertices without a triangle are left out. Draco reorders, and splits
 /// non-manifold vertices: match by slot.
-/// Errors: INVALID_ARGUMENT for an index out of range or a position that is not finite as float32,
-/// FAILED_PRECONDITION for a surface without a
-/// triangle that has an area, RESOURCE_EXHAUSTED when memory ran out, INTERNAL when Draco refuses.
+/// Errors: INVALID_ARGUMENT for an index out of range or a coordinate beyond a quarter of float32's range,
+/// FAILED_PRECONDITION for a surface without a triangle of three vertices, RESOURCE_EXHAUSTED when memory ran out, INTERNAL when Draco refuses.
 absl::StatusOr<std::string> EncodeSurface(const TriangleSurface& surface, int position_bits);
 
-/// The reverse, for tests and tools. `positions` are what the quantised file holds.
+/// The reverse, for tests and tools: of trusted bytes only, because nothing stands before Draco here. `positions` are what the quantised file holds.
 absl::StatusOr<TriangleSurface> DecodeSurface(const std::string& bytes);
 
 }  // namespace dynmesh

@@ -1,6 +1,8 @@
 #include "core/delta/delta.h"
 
 #include <algorithm>
+#include <set>
+#include <utility>
 #include <cmath>
 
 #include "absl/strings/str_cat.h"
@@ -86,17 +88,27 @@ absl::Status CheckAttribute(const AttributeChanges& changes) {
   return absl::OkStatus();
 }
 
+absl::Status CheckAttributes(const std::vector<AttributeChanges>& attributes) {
+  if (attributes.size() > kMaxAttributeColumns) return Broken("attributes", "are more than a session may have");
+  std::set<std::pair<EntityKind, absl::string_view>> seen;
+  for (const AttributeChanges& changes : attributes) {
+    DYNMESH_RETURN_IF_ERROR(CheckAttribute(changes));
+    if (!seen.emplace(changes.spec.kind, changes.spec.name).second) return Broken("attributes", "hold a column twice");
+  }
+  return absl::OkStatus();
+}
+
 }  // namespace
 
 absl::Status CheckDelta(const Delta& delta) {
+  if (delta.from_revision < 0 || delta.from_revision > delta.to_revision) {
+    return Broken("revisions", "do not ascend from 0");
+  }
   DYNMESH_RETURN_IF_ERROR(CheckVertices(delta));
   for (EntityKind kind : {EntityKind::kEdge, EntityKind::kFace, EntityKind::kCell}) {
     DYNMESH_RETURN_IF_ERROR(CheckElements(kind, delta.OfKind(kind)));
   }
-  for (const AttributeChanges& changes : delta.attributes) {
-    DYNMESH_RETURN_IF_ERROR(CheckAttribute(changes));
-  }
-  return absl::OkStatus();
+  return CheckAttributes(delta.attributes);
 }
 
 }  // namespace dynmesh

@@ -39,7 +39,8 @@ struct AttributeChanges {
 /// chunk of a longer answer: elements may refer to vertices that a later chunk brings, and only after
 /// the chunk with consistent = true does the copy equal the session at `to_revision`.
 ///
-/// Invariants (checked by CheckDelta): slot lists ascend; sizes agree; no slot is both removed and upserted;
+/// Invariants (checked by CheckDelta): 0 <= from_revision <= to_revision; at most kMaxAttributeColumns columns, each
+/// once; slot lists ascend; sizes agree; no slot is both removed and upserted;
 /// no slot, also of an element's vertex, is kNoSlot; element types have the dimension of their list;
 /// attribute specs are valid; positions and float attributes are finite.
 struct Delta {

@@ -128,6 +128,12 @@ Delta Diff(const Mesh& mesh, int64_t from) {
   return delta;
 }
 
+Delta ClosingDiff(const Mesh& mesh, int64_t start, int64_t base) {
+  Delta delta = Diff(mesh, start);
+  delta.from_revision = base;
+  return delta;
+}
+
 Delta DiffPart(const Mesh& mesh, int64_t from, size_t max_items, DiffCursor& cursor) {
   Delta delta = EmptyDelta(mesh, from);
   delta.consistent = false;

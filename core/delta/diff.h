@@ -16,6 +16,10 @@ namespace dynmesh {
 /// REQUIRES: 0 <= from <= mesh.revision(), no batch open. Cost: pages touched since, plus the answer.
 Delta Diff(const Mesh& mesh, int64_t from);
 
+/// Diff(mesh, start) for a copy that has `base` for certain and parts of Diff(mesh, base) made since `start`: closes
+/// the walk that DiffPart began. REQUIRES: base <= start.
+Delta ClosingDiff(const Mesh& mesh, int64_t start, int64_t base);
+
 /// A place in the walk over all slots that DiffPart makes: first vertices, then elements by dimension, then
 /// attributes.
 struct DiffCursor {
@@ -26,8 +30,8 @@ struct DiffCursor {
 };
 
 /// The next part of Diff(mesh, from), of at most about `max_items` slots, with consistent = false; moves
-/// `cursor` on. The mesh may change between parts: when the cursor is done, a Diff from the revision
-/// that the mesh had before the first part makes the copy exact.
+/// `cursor` on. The mesh may change between parts: when the cursor is done, ClosingDiff(mesh, start, from), with
+/// `start` the revision that the mesh had before the first part, makes the copy exact.
 Delta DiffPart(const Mesh& mesh, int64_t from, size_t max_items, DiffCursor& cursor);
 
 /// About how many slots Diff(mesh, from) would hold, at most; counts whole pages. Cost: pages.

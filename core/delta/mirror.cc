@@ -9,11 +9,7 @@ namespace dynmesh {
 
 absl::Status Mirror::Apply(const Delta& delta) {
   DYNMESH_RETURN_IF_ERROR(CheckDelta(delta));
-  if (delta.from_revision > revision_) {
-    return FailedPrecondition(reason::kRevisionMismatch,
-                              absl::StrCat("the delta starts at revision ", delta.from_revision,
-                                           ", this copy is at ", revision_));
-  }
+  DYNMESH_RETURN_IF_ERROR(CheckFits(delta));
   DYNMESH_RETURN_IF_ERROR(CheckColumns(delta));
   for (EntityKind kind : {EntityKind::kEdge, EntityKind::kFace, EntityKind::kCell}) {
     ApplyElements(kind, delta.OfKind(kind));
@@ -22,6 +18,22 @@ absl::Status Mirror::Apply(const Delta& delta) {
   for (size_t i = 0; i < delta.vertex_slots.size(); ++i) PutVertex(delta.vertex_slots[i], delta.positions[i]);
   for (const AttributeChanges& changes : delta.attributes) ApplyAttributes(changes);
   return delta.consistent ? CheckEqual(delta) : absl::OkStatus();
+}
+
+absl::Status Mirror::CheckFits(const Delta& delta) const {
+  if (delta.from_revision > revision_ || delta.to_revision < revision_) {
+    return FailedPrecondition(reason::kRevisionMismatch,
+                              absl::StrCat("the delta leads from revision ", delta.from_revision, " to ",
+                                           delta.to_revision, ", this copy is at ", revision_));
+  }
+  Slot highest = delta.vertex_slots.empty() ? 0 : delta.vertex_slots.back();
+  for (const ElementChanges& changes : delta.elements) {
+    if (!changes.slots.empty()) highest = std::max(highest, changes.slots.back());
+  }
+  for (const AttributeChanges& changes : delta.attributes) {
+    if (!changes.slots.empty()) highest = std::max(highest, changes.slots.back());
+  }
+  return highest < kMaxSlots ? absl::OkStatus() : LimitExceeded("max_mirror_slots", kMaxSlots, uint64_t{highest} + 1);
 }
 
 void Mirror::ApplyElements(EntityKind kind, const ElementChanges& changes) {
@@ -69,8 +81,8 @@ void Mirror::RemoveVertex(Slot slot) {
 void Mirror::PutVertex(Slot slot, const Point& position) {
   RemoveVertex(slot);
   if (slot >= has_vertex_.size()) {
-    has_vertex_.resize(slot + 1);
     positions_.resize(slot + 1);
+    has_vertex_.resize(slot + 1);  // last: it says how many there are
   }
   has_vertex_[slot] = true;
   positions_[slot] = position;
@@ -93,8 +105,8 @@ void Mirror::PutElement(EntityKind kind, ElementType type, Slot slot, const Vert
   Table& table = elements_[Dimension(kind) - 1];
   Widen(table, NumVertices(type));
   if (slot >= table.types.size()) {
-    table.types.resize(slot + 1);
     table.vertices.resize((size_t{slot} + 1) * table.stride);
+    table.types.resize(slot + 1);  // last: it says how many there are
   }
   table.types[slot] = type;
   std::copy_n(vertices, NumVertices(type), &table.vertices[size_t{slot} * table.stride]);

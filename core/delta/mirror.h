@@ -17,18 +17,21 @@ namespace dynmesh {
 ///     Mirror mirror;
 ///     DYNMESH_RETURN_IF_ERROR(mirror.Apply(delta));   // checksum compared when the delta is consistent
 ///
-/// Cost: Apply linear in the delta; memory 1 + 32 bytes a vertex slot, 1 + 4 * 8 a cell slot at most.
+/// Cost: Apply linear in the delta; memory 24 bytes a vertex slot, 1 + 4 * 8 a cell slot at most.
 /// Thread safety: that of std::vector.
 class Mirror {
  public:
   enum class Geometry { kExact, kQuantized };  ///< kQuantized: only the topology checksum is compared
 
+  /// Slots beyond are refused: the arrays are as long as the highest slot.
+  static constexpr Slot kMaxSlots = Slot{1} << 28;
+
   explicit Mirror(Geometry geometry = Geometry::kExact) : geometry_(geometry) {}
 
-  /// Applies a delta that starts at or before what this copy holds.
-  /// Errors: FAILED_PRECONDITION REVISION_MISMATCH (it starts later, nothing changed); DATA_LOSS
-  /// CORRUPT_PAYLOAD (CheckDelta, nothing changed) or CHECKSUM_MISMATCH (applied, and the copy is not equal:
-  /// follow again from 0).
+  /// Applies a delta that starts at or before what this copy holds, and does not end before it.
+  /// Errors: FAILED_PRECONDITION REVISION_MISMATCH (it starts later or ends earlier), DATA_LOSS CORRUPT_PAYLOAD
+  /// (CheckDelta), RESOURCE_EXHAUSTED (kMaxSlots): nothing changed. DATA_LOSS CHECKSUM_MISMATCH: applied, and
+  /// the copy is not equal; follow from 0 with a new Mirror.
   absl::Status Apply(const Delta& delta);
 
   /// Of the last consistent delta.
@@ -62,6 +65,7 @@ class Mirror {
   void PutElement(EntityKind kind, ElementType type, Slot slot, const VertexId* vertices);
   void Widen(Table& table, int stride);
   AttributeColumn* FindColumn(const AttributeSpec& spec);
+  absl::Status CheckFits(const Delta& delta) const;
   absl::Status CheckColumns(const Delta& delta);
   void ApplyElements(EntityKind kind, const ElementChanges& changes);
   void ApplyAttributes(const AttributeChanges& changes);

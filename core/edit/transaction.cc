@@ -1,6 +1,6 @@
 #include "core/edit/transaction.h"
 
-#include <cstring>
+#include <new>
 #include <string>
 
 #include "absl/strings/str_cat.h"
@@ -62,9 +62,10 @@ class BatchApplier {
   }
 
   absl::Status operator()(const RemoveElementsEdit& edit) {
+    if (!IsEntityKind(edit.kind)) return BadKind(edit.kind);
     return ForEach(edit.elements.size(), [&](size_t i) -> absl::Status {
       const EntityId id(edit.kind, edit.elements[i]);
-      if (edit.kind != EntityKind::kVertex) DYNMESH_RETURN_IF_ERROR(mesh_.CheckLive(id, as_of_));
+      DYNMESH_RETURN_IF_ERROR(CheckElement(id));
       return mesh_.RemoveElement(id);
     });
   }
@@ -72,6 +73,7 @@ class BatchApplier {
   absl::Status operator()(const AddAttributeEdit& edit) { return mesh_.AddAttribute(edit.spec); }
 
   absl::Status operator()(const SetAttributeEdit& edit) {
+    if (!IsEntityKind(edit.spec.kind)) return BadKind(edit.spec.kind);
     const int column = mesh_.FindAttribute(edit.spec.name, edit.spec.kind);
     if (column < 0 || mesh_.attributes()[column].spec() != edit.spec) return UnknownAttribute(edit.spec);
     const size_t row_bytes = edit.spec.row_bytes();
@@ -108,6 +110,18 @@ class BatchApplier {
     }
     DYNMESH_RETURN_IF_ERROR(mesh_.CheckLive(VertexId(slot), as_of_));
     return VertexId(slot);
+  }
+
+  /// An element is as old as its last addition: a face may have lived on as a derived one in between.
+  absl::Status CheckElement(EntityId id) const {
+    if (id.kind == EntityKind::kVertex) return absl::OkStatus();  // RemoveElement refuses it
+    DYNMESH_RETURN_IF_ERROR(mesh_.CheckLive(id, as_of_));
+    const bool same = !mesh_.IsElement(id) || mesh_.changed(id.kind).At(id.slot) <= as_of_;
+    return same ? absl::OkStatus() : EntityNotFound(reason::kEntityRemoved, id);
+  }
+
+  static absl::Status BadKind(EntityKind kind) {
+    return InvalidArgument(reason::kBadEntityKind, absl::StrCat("entity kind ", Dimension(kind), " is none of 0-3"));
   }
 
   absl::StatusOr<EntityId> ResolveEntity(EntityKind kind, Slot slot) const {
@@ -159,6 +173,15 @@ absl::Status ApplyAll(Mesh& mesh, absl::Span<const Edit> edits, const BatchOptio
   return absl::OkStatus();
 }
 
+/// Memory that runs out in the middle is a refusal like others: the batch is rolled back, which needs next to none.
+absl::Status TryApplyAll(Mesh& mesh, absl::Span<const Edit> edits, const BatchOptions& options,
+                         BatchResult& result) try {
+  return ApplyAll(mesh, edits, options, result);
+} catch (const std::bad_alloc&) {
+  return MakeError(absl::StatusCode::kResourceExhausted, reason::kLimitExceeded, "memory ran out",
+                   {{"limit", "memory"}});
+}
+
 }  // namespace
 
 uint64_t NumItems(const Edit& edit) {
@@ -179,7 +202,7 @@ uint64_t NumItems(const Edit& edit) {
 absl::StatusOr<BatchResult> ApplyBatch(Mesh& mesh, absl::Span<const Edit> edits, const BatchOptions& options) {
   BatchResult result;
   mesh.BeginBatch();
-  absl::Status status = ApplyAll(mesh, edits, options, result);
+  absl::Status status = TryApplyAll(mesh, edits, options, result);
   if (!status.ok()) {
     mesh.Rollback();
     return status;

@@ -77,7 +77,8 @@ struct BatchOptions {
 ///
 /// An edit may use what an earlier one of the batch made: vertices as kNewVertex | k. An id of an occupant
 /// that the batch itself removed is refused; ids that it made cannot be named otherwise, because no slot
-/// freed in a batch is reused in it and as_of_revision lies before it.
+/// freed in a batch is reused in it and as_of_revision lies before it. A face or edge that was an element, then derived,
+/// and is an element again counts as another one.
 ///
 /// Errors: those of Mesh's edits, with metadata "edit" (index in `edits`) and "index" (item of that edit).
 /// After an error or a dry run the mesh is as it was, to the last id and stamp.

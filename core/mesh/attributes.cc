@@ -59,33 +59,33 @@ absl::Status CheckFinite(const AttributeSpec& spec, absl::Span<const uint8_t> va
 }
 
 absl::Span<const uint8_t> AttributeColumn::Row(Slot slot) const {
-  const size_t width = spec_.row_bytes();
-  const size_t begin = slot * width;
-  if (begin >= rows_.size()) return zeros_;
-  return absl::MakeConstSpan(rows_).subspan(begin, width);
+  const size_t page = slot / StampColumn::kPageSlots;
+  if (page >= pages_.size() || pages_[page].empty()) return zeros_;
+  return absl::MakeConstSpan(pages_[page]).subspan(slot % StampColumn::kPageSlots * zeros_.size(), zeros_.size());
 }
 
 void AttributeColumn::SetRow(Slot slot, absl::Span<const uint8_t> row, Stamp stamp) {
-  assert(row.size() == zeros_.size());
-  GrowTo(slot);
-  std::copy(row.begin(), row.end(), rows_.begin() + slot * row.size());
+  CopyRow(slot, row);
   stamps_.Touch(slot, stamp);
 }
 
 void AttributeColumn::RestoreRow(Slot slot, absl::Span<const uint8_t> row, Stamp stamp) {
-  assert(row.size() == zeros_.size());
-  GrowTo(slot);
-  std::copy(row.begin(), row.end(), rows_.begin() + slot * row.size());
+  CopyRow(slot, row);
   stamps_.Restore(slot, stamp);
 }
 
 size_t AttributeColumn::memory_bytes() const {
-  return rows_.capacity() + zeros_.capacity() + stamps_.memory_bytes();
+  size_t bytes = stamps_.memory_bytes() + pages_.size() * sizeof(pages_[0]);
+  for (const auto& page : pages_) bytes += page.size();
+  return bytes;
 }
 
-void AttributeColumn::GrowTo(Slot slot) {
-  const size_t needed = (slot + size_t{1}) * spec_.row_bytes();
-  if (rows_.size() < needed) rows_.resize(needed);
+void AttributeColumn::CopyRow(Slot slot, absl::Span<const uint8_t> row) {
+  assert(row.size() == zeros_.size());
+  const size_t page = slot / StampColumn::kPageSlots;
+  if (page >= pages_.size()) pages_.resize(page + 1);
+  if (pages_[page].empty()) pages_[page].resize(StampColumn::kPageSlots * row.size());
+  std::copy(row.begin(), row.end(), pages_[page].begin() + slot % StampColumn::kPageSlots * row.size());
 }
 
 }  // namespace dynmesh

@@ -46,7 +46,8 @@ absl::Status CheckFinite(const AttributeSpec& spec, absl::Span<const uint8_t> va
 
 /// One column: a row of `components` scalars for every slot of its kind, little-endian as in memory.
 ///
-/// A row that was never set, or whose slot got a new occupant, is all zeros.
+/// A row that was never set, or whose slot got a new occupant, is all zeros. Rows are held in pages, so that one
+/// row at a far slot costs one page.
 class AttributeColumn {
  public:
   /// `born`: revision at which the column was added.
@@ -68,11 +69,11 @@ class AttributeColumn {
   size_t memory_bytes() const;
 
  private:
-  void GrowTo(Slot slot);
+  void CopyRow(Slot slot, absl::Span<const uint8_t> row);
 
   AttributeSpec spec_;
   Stamp born_;
-  std::vector<uint8_t> rows_;
+  std::vector<std::vector<uint8_t>> pages_;  ///< rows of StampColumn::kPageSlots slots each; empty: all zeros
   std::vector<uint8_t> zeros_ = std::vector<uint8_t>(spec_.row_bytes());
   StampColumn stamps_;
 };

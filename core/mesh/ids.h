@@ -16,6 +16,8 @@ inline constexpr EntityKind kEntityKinds[] = {EntityKind::kVertex, EntityKind::k
                                               EntityKind::kFace, EntityKind::kCell};
 inline constexpr int kNumEntityKinds = 4;
 
+constexpr bool IsEntityKind(EntityKind kind) { return static_cast<int>(kind) < kNumEntityKinds; }
+
 constexpr int Dimension(EntityKind kind) { return static_cast<int>(kind); }
 
 /// "vertex", "edge", "face" or "cell".

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "absl/container/flat_hash_map.h"
+#include "absl/container/inlined_vector.h"
 #include "absl/types/span.h"
 #include "core/mesh/ids.h"
 
@@ -65,12 +66,6 @@ class IncidenceLists {
     }
   }
 
-  /// Replaces one entry by another. REQUIRES: it is there.
-  void Replace(Slot lower, UpperId old_upper, UpperId new_upper) {
-    Remove(lower, old_upper);
-    Add(lower, new_upper);
-  }
-
   void Reserve(size_t lists, size_t entries) {
     lists_.reserve(lists);
     pool_.reserve(entries);
@@ -78,7 +73,7 @@ class IncidenceLists {
 
   size_t memory_bytes() const {
     size_t bytes = lists_.size() * sizeof(List) + pool_.size() * sizeof(UpperId) +
-                   positions_.capacity() * (sizeof(uint64_t) + sizeof(uint32_t) + 1);
+                   positions_.size() * (sizeof(uint64_t) + sizeof(Positions) + 1);
     for (const auto& rooms : free_rooms_) bytes += rooms.size() * sizeof(uint32_t);
     return bytes;
   }
@@ -150,10 +145,7 @@ class IncidenceLists {
 
   uint32_t Position(Slot lower, UpperId upper) const {
     const auto entries = Of(lower);
-    if (entries.size() > kIndexedLength) {
-      const auto it = positions_.find(Key(lower, upper));
-      if (it != positions_.end()) return it->second;
-    }
+    if (entries.size() > kIndexedLength) return positions_.find(Key(lower, upper))->second.back();
     return std::find(entries.begin(), entries.end(), upper) - entries.begin();
   }
 
@@ -161,7 +153,7 @@ class IncidenceLists {
   void IndexAdded(Slot lower) {
     const auto entries = Of(lower);
     const uint32_t first = entries.size() == kIndexedLength + 1 ? 0 : entries.size() - 1;
-    for (uint32_t i = first; i < entries.size(); ++i) positions_[Key(lower, entries[i])] = i;
+    for (uint32_t i = first; i < entries.size(); ++i) positions_[Key(lower, entries[i])].push_back(i);
   }
 
   /// The entry at `position` goes and the one at `last` takes its place, in a list that was long.
@@ -172,15 +164,21 @@ class IncidenceLists {
       for (uint32_t i = 0; i <= last; ++i) positions_.erase(Key(lower, entries[i]));
       return;
     }
-    positions_.erase(Key(lower, entries[position]));
-    if (position != last) positions_[Key(lower, entries[last])] = position;
+    const auto moved = positions_.find(Key(lower, entries[last]));
+    *std::find(moved->second.begin(), moved->second.end(), last) = position;
+    const auto removed = positions_.find(Key(lower, entries[position]));
+    removed->second.erase(std::find(removed->second.begin(), removed->second.end(), position));
+    if (removed->second.empty()) positions_.erase(removed);
   }
+
+  /// Where an upper entity stands in a long list: once for each use, at most twelve times.
+  using Positions = absl::InlinedVector<uint32_t, 2>;
 
   std::vector<List> lists_;
   std::vector<UpperId> pool_;
   uint32_t longest_ = 0;  ///< length of the longest list so far
   std::array<std::vector<uint32_t>, kNumClasses> free_rooms_;
-  absl::flat_hash_map<uint64_t, uint32_t> positions_;  ///< of the entries of long lists
+  absl::flat_hash_map<uint64_t, Positions> positions_;  ///< of the entries of long lists
 };
 
 }  // namespace dynmesh

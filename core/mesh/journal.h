@@ -20,8 +20,6 @@ enum class JournalOp : uint8_t {
   kClearDuplicate,   ///< duplicate flag cleared
   kFlipEdge,         ///< the two vertices changed places
   kReorderFace,      ///< a = FaceCode that leads back
-  kReplaceCellFace,  ///< a = local face, b = packed OrientedFace before
-  kReplaceFaceEdge,  ///< a = local edge, b = edge before
   kMoveVertex,       ///< b = changed stamp before; position before: Journal::positions
   kAddAttribute,     ///< the last column was added
   kSetAttribute,     ///< a = column, b = stamp before; row before: Journal::rows

@@ -156,7 +156,10 @@ absl::Status Mesh::SetAttribute(int column, Slot slot, absl::Span<const uint8_t>
                                         " bytes, not ", row.size()),
                            {{"attribute", spec.name}});
   }
-  DYNMESH_RETURN_IF_ERROR(CheckFinite(spec, row));
+  if (!CheckFinite(spec, row).ok()) {
+    return InvalidArgument(reason::kNonFinite, absl::StrCat("a value of attribute '", spec.name, "' is NaN or infinite"),
+                           {{"attribute", spec.name}});
+  }
   WriteAttribute(column, slot, row);
   return absl::OkStatus();
 }

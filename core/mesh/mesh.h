@@ -8,11 +8,11 @@
 #include <utility>
 #include <vector>
 
+#include "absl/container/btree_set.h"
 #include "absl/container/flat_hash_map.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
-#include "absl/types/optional.h"
 #include "absl/types/span.h"
 #include "core/mesh/attributes.h"
 #include "core/mesh/bit_set.h"
@@ -24,26 +24,9 @@
 #include "core/mesh/journal.h"
 #include "core/mesh/slots.h"
 #include "core/mesh/stamps.h"
+#include "core/mesh/vertex_cycle.h"
 
 namespace dynmesh {
-
-/// How a stored face lies in a cell (or another list of the same vertices): with n vertices,
-/// key[k] = stored[(rotation + k) mod n], or stored[(rotation - k) mod n] when flipped.
-struct FaceCode {
-  uint8_t value = 0;  ///< rotation | flipped << 2
-
-  constexpr int rotation() const { return value & 3; }
-  constexpr bool flipped() const { return value & 4; }
-  /// Position in the stored face of the key's vertex k.
-  constexpr int StoredVertex(int k, int n) const { return (rotation() + (flipped() ? n - k : k)) % n; }
-  /// Position in the stored face of the key's edge k, which joins key vertices k and k + 1.
-  constexpr int StoredEdge(int k, int n) const {
-    return (rotation() + (flipped() ? n - k - 1 : k)) % n;
-  }
-};
-
-/// How the face with the vertex cycle `stored` lies against `key`, or nullopt if they are not the same cycle.
-absl::optional<FaceCode> MatchFace(absl::Span<const VertexId> stored, absl::Span<const VertexId> key);
 
 /// A face of a cell with its orientation code, in 32 bits: hence at most 2^29 - 1 faces.
 class OrientedFace {
@@ -60,7 +43,8 @@ class OrientedFace {
 
 enum class DuplicatePolicy { kKeep, kRefuse };
 
-/// Upper bounds on slots ever used, for each kind; beyond: RESOURCE_EXHAUSTED.
+/// Upper bounds on slots ever used, for each kind; beyond: RESOURCE_EXHAUSTED. An element is let in only if there is
+/// room for all its faces and edges, as if none of them existed.
 struct MeshLimits {
   /// Vertex ids stay below 2^31 (edit batches use the top bit), faces below 2^29 (OrientedFace).
   std::array<uint32_t, kNumEntityKinds> max_slots = {0x7fffffffu, 0x7fffffffu, 0x1fffffffu, 0x7fffffffu};
@@ -87,9 +71,8 @@ struct MeshOptions {
 /// entry for each use, in arbitrary order: a face that uses an edge twice is in its list twice.
 ///
 /// Invariants (Validate() in validate.h checks them all):
-///  - each vertex pair has at most one edge that faces use, each vertex cycle at most one face that cells
-///    use (the primary); other edges and faces there are duplicate elements, and while any element
-///    stands there, the primary is one;
+///  - each vertex pair has exactly one edge that faces may use, each vertex cycle exactly one face that cells
+///    may use (the primary); other edges and faces there are duplicate elements, used by nobody;
 ///  - a derived entity is used by something; a face or edge is on the boundary bit sets and counters
 ///    exactly as its number of uses says;
 ///  - checksum, counts and stamps are those of the present content.
@@ -187,7 +170,8 @@ class Mesh {
   /// Errors: INVALID_ARGUMENT NON_FINITE_VALUE.
   absl::Status MoveVertex(VertexId v, const Point& position);
 
-  /// Adds an element; a derived face or edge with the same vertices becomes it and takes its vertex order.
+  /// Adds an element; a derived face or edge with the same vertices becomes it and takes its vertex order (but a
+  /// face of more than 64 cells that lies otherwise stays, and the element becomes a duplicate of it).
   /// Degenerate elements (a vertex named twice) are kept.
   /// Errors: INVALID_ARGUMENT BAD_ELEMENT_TYPE, BAD_ARRAY_LENGTH, DUPLICATE_ELEMENT (if so opted);
   /// RESOURCE_EXHAUSTED.
@@ -234,7 +218,9 @@ class Mesh {
   static constexpr uint8_t kElementFlag = 8;
   static constexpr uint8_t kDuplicateFlag = 16;
   static constexpr CellId kOverflow{kNoSlot - 1};
-  static constexpr uint32_t kHubDegree = 512;  ///< vertices of more edges find them through hub_edges_
+  /// Vertices of more edges find them through hub_edges_, edges of more faces through hub_faces_.
+  static constexpr uint32_t kHubDegree = 512;
+  static constexpr uint32_t kMaxReorderedCells = 64;
 
   using VertexSpan = absl::Span<const VertexId>;
 
@@ -261,6 +247,7 @@ class Mesh {
   absl::StatusOr<EntityId> AddCell(ElementType type, VertexSpan vertices);
   absl::Status RefuseDuplicate(EntityId existing) const;
   CellId FindCell(ElementType type, const CellParts& parts) const;
+  CellId FindCellButNot(CellId c, ElementType type, const CellParts& parts) const;
   bool HasFaces(CellId c, ElementType type, const CellParts& parts) const;
   void FindCellParts(const ElementTemplate& shape, VertexSpan vertices, CellParts& parts) const;
   FaceMatch FindFaceAround(EdgeId e, VertexSpan vertices) const;
@@ -284,6 +271,10 @@ class Mesh {
   void CountElement(EntityId id, int change);
   void IndexHubEdges(VertexId v);
   void IndexHubEdge(EdgeId e);
+  void ForgetHubEdge(EdgeId e);
+  void IndexHubFaces(EdgeId e);
+  void IndexHubFace(FaceId f);
+  void ForgetHubFace(FaceId f);
   void LinkEdge(EdgeId e);
   void UnlinkEdge(EdgeId e);
   void LinkFace(FaceId f);
@@ -307,14 +298,9 @@ class Mesh {
   FaceCode CodeInCell(CellId c, int local_face, FaceId f) const;
 
   // mesh_duplicates.cc: keeping one primary for each vertex pair or cycle
-  void PassOnPrimary(EntityId id);
-  EdgeId FindDuplicateOf(EdgeId e) const;
-  FaceId FindDuplicateOf(FaceId f) const;
-  void MoveUsesTo(EdgeId from, EdgeId to);
-  void MoveUsesTo(FaceId from, FaceId to);
-  void ReplaceCellFace(CellId c, int local_face, FaceId to);
-  void ReplaceFaceEdge(FaceId f, int local_edge, EdgeId to);
+  void CountDuplicate(EntityId id, int change);
   void SetDuplicateFlag(EntityId id, bool duplicate);
+  void PassOnPrimary(EntityId ended);
 
   uint64_t ElementTerm(EntityId id) const;
   void Touch(EntityId id) { changed_[Dimension(id.kind)].Touch(id.slot, next_stamp()); }
@@ -343,7 +329,8 @@ class Mesh {
   std::array<StampColumn, kNumEntityKinds> changed_;
   std::array<std::vector<uint8_t>, kNumEntityKinds> flags_;  ///< type | element | duplicate; none for vertices
   std::array<uint32_t, kNumEntityKinds> num_elements_ = {};
-  std::array<uint32_t, kNumEntityKinds> num_duplicates_ = {};
+  /// Slots of duplicate edges and faces, by their vertices.
+  std::array<absl::flat_hash_map<CycleKey, absl::btree_set<Slot>>, kNumEntityKinds> duplicates_;
 
   std::vector<Point> positions_;
   std::vector<std::array<VertexId, 2>> edge_vertices_;
@@ -364,6 +351,8 @@ class Mesh {
   Slot num_overflow_lists_ = 0;
   /// Edges between two vertices that both have very many, by vertex pair, lower first.
   absl::flat_hash_map<std::pair<VertexId, VertexId>, EdgeId> hub_edges_;
+  /// Primary faces all of whose edges have very many, by CanonicalCycle.
+  absl::flat_hash_map<CycleKey, FaceId> hub_faces_;
 
   std::array<BitSet, kNumEntityKinds> boundary_;
   std::array<std::vector<uint32_t>, kNumEntityKinds> boundary_uses_;  ///< of vertices and edges

@@ -29,19 +29,6 @@ struct Mesh::CellParts {
   std::array<FaceMatch, kMaxElementFaces> faces;
 };
 
-absl::optional<FaceCode> MatchFace(absl::Span<const VertexId> stored, absl::Span<const VertexId> key) {
-  const int n = stored.size();
-  if (key.size() != stored.size()) return absl::nullopt;
-  for (int value = 0; value < 8; ++value) {
-    const FaceCode code{static_cast<uint8_t>(value)};
-    if (code.rotation() >= n || stored[code.rotation()] != key[0]) continue;
-    int k = 1;
-    while (k < n && stored[code.StoredVertex(k, n)] == key[k]) ++k;
-    if (k == n) return code;
-  }
-  return absl::nullopt;
-}
-
 // ---- Checks ----
 
 absl::StatusOr<EntityId> Mesh::AddElement(ElementType type, absl::Span<const VertexId> vertices) {
@@ -131,6 +118,10 @@ EdgeId Mesh::LeastUsed(absl::Span<const EdgeId> edges) const {
 }
 
 Mesh::FaceMatch Mesh::FindFaceAround(EdgeId e, VertexSpan vertices) const {
+  if (edge_faces_.Length(e.slot()) > kHubDegree) {
+    const auto it = hub_faces_.find(CanonicalCycle(vertices));
+    return it == hub_faces_.end() ? FaceMatch() : FaceMatch{it->second, *MatchFace(Vertices(it->second), vertices)};
+  }
   for (FaceId f : IncidentFaces(e)) {
     if (IsDuplicate(f)) continue;
     if (const auto code = MatchFace(Vertices(f), vertices)) return {f, *code};
@@ -173,21 +164,28 @@ void Mesh::FindCellParts(const ElementTemplate& shape, VertexSpan vertices, Cell
 bool Mesh::HasFaces(CellId c, ElementType type, const CellParts& parts) const {
   if (Type(c) != type) return false;
   const auto faces = Faces(c);
-  return std::all_of(faces.begin(), faces.end(), [&](OrientedFace oriented) {
-    return std::any_of(parts.faces.begin(), parts.faces.begin() + faces.size(),
-                       [&](const FaceMatch& match) { return match.face == oriented.face(); });
-  });
+  std::array<FaceId, kMaxElementFaces> theirs, ours;
+  for (size_t i = 0; i < faces.size(); ++i) {
+    theirs[i] = faces[i].face();
+    ours[i] = parts.faces[i].face;
+  }
+  std::sort(theirs.begin(), theirs.begin() + faces.size());
+  std::sort(ours.begin(), ours.begin() + faces.size());
+  return std::equal(theirs.begin(), theirs.begin() + faces.size(), ours.begin());
 }
 
 CellId Mesh::FindCell(ElementType type, const CellParts& parts) const {
-  const int num_faces = TemplateOf(type).num_faces;
-  const auto least_used = std::min_element(
-      parts.faces.begin(), parts.faces.begin() + num_faces, [this](const FaceMatch& a, const FaceMatch& b) {
-        return (a.face.valid() ? NumFaceCells(a.face) : 0) < (b.face.valid() ? NumFaceCells(b.face) : 0);
-      });
+  return FindCellButNot(CellId(), type, parts);
+}
+
+CellId Mesh::FindCellButNot(CellId c, ElementType type, const CellParts& parts) const {
+  const auto uses = [this](const FaceMatch& match) { return match.face.valid() ? NumFaceCells(match.face) : 0; };
+  const auto least_used =
+      std::min_element(parts.faces.begin(), parts.faces.begin() + TemplateOf(type).num_faces,
+                       [&](const FaceMatch& a, const FaceMatch& b) { return uses(a) < uses(b); });
   if (!least_used->face.valid()) return CellId();
-  for (CellId c : IncidentCells(least_used->face)) {
-    if (HasFaces(c, type, parts)) return c;
+  for (CellId other : IncidentCells(least_used->face)) {
+    if (other != c && HasFaces(other, type, parts)) return other;
   }
   return CellId();
 }
@@ -196,10 +194,7 @@ CellId Mesh::FindTwin(CellId c) const {
   const auto faces = Faces(c);
   CellParts parts;
   for (size_t i = 0; i < faces.size(); ++i) parts.faces[i] = {faces[i].face(), faces[i].code()};
-  for (CellId other : IncidentCells(faces[0].face())) {
-    if (other != c && HasFaces(other, Type(c), parts)) return other;
-  }
-  return CellId();
+  return FindCellButNot(c, Type(c), parts);
 }
 
 // ---- Creation ----
@@ -229,12 +224,14 @@ absl::StatusOr<EntityId> Mesh::AddFaceElement(VertexSpan vertices) {
   const bool all_exist =
       std::all_of(edge_span.begin(), edge_span.end(), [](EdgeId e) { return e.valid(); });
   const FaceMatch match = all_exist ? FindFaceAround(LeastUsed(edge_span), vertices) : FaceMatch();
-  if (match.face.valid() && !IsElement(match.face)) {
+  const bool cheap = match.code.value == 0 || (match.face.valid() && NumFaceCells(match.face) <= kMaxReorderedCells);
+  if (match.face.valid() && !IsElement(match.face) && cheap) {
     ReorderFace(match.face, match.code);
     SetElementFlag(match.face);
     return match.face;
   }
-  if (match.face.valid() && options_.duplicates == DuplicatePolicy::kRefuse) return RefuseDuplicate(match.face);
+  const bool equals_element = match.face.valid() && IsElement(match.face);
+  if (equals_element && options_.duplicates == DuplicatePolicy::kRefuse) return RefuseDuplicate(match.face);
   for (size_t k = 0; k < n; ++k) {
     if (!edges[k].valid()) edges[k] = EnsureEdge(vertices[k], vertices[(k + 1) % n]);
   }
@@ -301,7 +298,6 @@ absl::Status Mesh::RemoveElement(EntityId id) {
     DestroyCell(CellId(id.slot));
     return absl::OkStatus();
   }
-  PassOnPrimary(id);
   ClearElementFlag(id);
   if (id.kind == EntityKind::kFace) {
     ReleaseFace(FaceId(id.slot));

@@ -14,7 +14,7 @@ EdgeId Mesh::CreateEdge(VertexId a, VertexId b, uint8_t extra_flags) {
   const EdgeId e(NewSlot(EntityKind::kEdge, entry));
   edge_vertices_[e.slot()] = {a, b};
   flags(e) = static_cast<uint8_t>(ElementType::kWireEdge) | extra_flags;
-  if (IsDuplicate(e)) ++num_duplicates_[1];
+  if (IsDuplicate(e)) CountDuplicate(e, +1);
   LinkEdge(e);
   if (IsElement(e)) CountElement(e, +1);
   Record(entry);
@@ -29,7 +29,7 @@ FaceId Mesh::CreateFace(VertexSpan vertices, absl::Span<const EdgeId> edges, uin
   std::copy(edges.begin(), edges.end(), face_edges_.begin() + row);
   const ElementType type = vertices.size() == 4 ? ElementType::kQuad : ElementType::kTriangle;
   flags(f) = static_cast<uint8_t>(type) | extra_flags;
-  if (IsDuplicate(f)) ++num_duplicates_[2];
+  if (IsDuplicate(f)) CountDuplicate(f, +1);
   LinkFace(f);
   if (IsElement(f)) CountElement(f, +1);
   Record(entry);
@@ -62,17 +62,19 @@ void Mesh::DestroyVertex(VertexId v) {
 void Mesh::DestroyEdge(EdgeId e) {
   ZeroAttributes(e);
   Record({JournalOp::kDestroy, EntityKind::kEdge, e.slot(), 0, 0});
-  if (IsDuplicate(e)) --num_duplicates_[1];
+  if (IsDuplicate(e)) CountDuplicate(e, -1);
   UnlinkEdge(e);
   mutable_slots(EntityKind::kEdge).Free(e.slot());
+  PassOnPrimary(e);
 }
 
 void Mesh::DestroyFace(FaceId f) {
   ZeroAttributes(f);
   Record({JournalOp::kDestroy, EntityKind::kFace, f.slot(), 0, 0});
-  if (IsDuplicate(f)) --num_duplicates_[2];
+  if (IsDuplicate(f)) CountDuplicate(f, -1);
   UnlinkFace(f);
   mutable_slots(EntityKind::kFace).Free(f.slot());
+  PassOnPrimary(f);
   for (EdgeId e : Edges(f)) ReleaseEdge(e);
 }
 
@@ -104,13 +106,15 @@ void Mesh::LinkEdge(EdgeId e) {
 }
 
 void Mesh::UnlinkEdge(EdgeId e) {
+  ForgetHubEdge(e);
+  for (VertexId v : Vertices(e)) vertex_edges_.Remove(v.slot(), e);
+}
+
+void Mesh::ForgetHubEdge(EdgeId e) {
+  if (hub_edges_.empty()) return;
   const auto [a, b] = edge_vertices_[e.slot()];
-  if (!hub_edges_.empty()) {
-    const auto it = hub_edges_.find(std::minmax(a, b));
-    if (it != hub_edges_.end() && it->second == e) hub_edges_.erase(it);
-  }
-  vertex_edges_.Remove(a.slot(), e);
-  vertex_edges_.Remove(b.slot(), e);
+  const auto it = hub_edges_.find(std::minmax(a, b));
+  if (it != hub_edges_.end() && it->second == e) hub_edges_.erase(it);
 }
 
 void Mesh::IndexHubEdges(VertexId v) {
@@ -125,10 +129,32 @@ void Mesh::IndexHubEdge(EdgeId e) {
 
 void Mesh::LinkFace(FaceId f) {
   face_cells_[f.slot()] = {CellId(), CellId()};
-  for (EdgeId e : Edges(f)) AddEdgeFace(e, f);
+  for (EdgeId e : Edges(f)) {
+    AddEdgeFace(e, f);
+    if (edge_faces_.Length(e.slot()) == kHubDegree + 1) IndexHubFaces(e);
+  }
+  IndexHubFace(f);
+}
+
+void Mesh::IndexHubFaces(EdgeId e) {
+  for (FaceId f : IncidentFaces(e)) IndexHubFace(f);
+}
+
+void Mesh::IndexHubFace(FaceId f) {
+  const auto edges = Edges(f);
+  const bool hubs = std::all_of(edges.begin(), edges.end(),
+                                [this](EdgeId e) { return edge_faces_.Length(e.slot()) > kHubDegree; });
+  if (hubs && !IsDuplicate(f)) hub_faces_[CanonicalCycle(Vertices(f))] = f;
+}
+
+void Mesh::ForgetHubFace(FaceId f) {
+  if (hub_faces_.empty()) return;
+  const auto it = hub_faces_.find(CanonicalCycle(Vertices(f)));
+  if (it != hub_faces_.end() && it->second == f) hub_faces_.erase(it);
 }
 
 void Mesh::UnlinkFace(FaceId f) {
+  ForgetHubFace(f);
   for (EdgeId e : Edges(f)) RemoveEdgeFace(e, f);
 }
 
@@ -248,9 +274,8 @@ void Mesh::FlipEdge(EdgeId e) {
 
 void Mesh::ReorderFace(FaceId f, FaceCode code) {
   const int n = FaceSize(f);
-  const int back = code.flipped() ? code.rotation() : (n - code.rotation()) % n;
-  Record({JournalOp::kReorderFace, EntityKind::kFace, f.slot(),
-          static_cast<uint32_t>(back | (code.flipped() ? 4 : 0)), 0});
+  if (code.value == 0) return;
+  Record({JournalOp::kReorderFace, EntityKind::kFace, f.slot(), code.Inverse(n).value, 0});
   std::array<VertexId, kMaxFaceVertices> vertices;
   std::array<EdgeId, kMaxFaceVertices> edges;
   std::copy(Vertices(f).begin(), Vertices(f).end(), vertices.begin());

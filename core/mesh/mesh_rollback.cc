@@ -38,10 +38,6 @@ void Mesh::Undo(const JournalEntry& entry) {
       return FlipEdge(EdgeId(id.slot));
     case JournalOp::kReorderFace:
       return ReorderFace(FaceId(id.slot), FaceCode{static_cast<uint8_t>(entry.a)});
-    case JournalOp::kReplaceCellFace:
-      return ReplaceCellFace(CellId(id.slot), entry.a, FaceId(entry.b));
-    case JournalOp::kReplaceFaceEdge:
-      return ReplaceFaceEdge(FaceId(id.slot), entry.a, EdgeId(entry.b));
     case JournalOp::kMoveVertex:
       return UndoMove(entry);
     case JournalOp::kAddAttribute:
@@ -71,7 +67,7 @@ void Mesh::UndoCreate(const JournalEntry& entry) {
   }
   const EntityId id(entry.kind, entry.slot);
   if (IsElement(id)) CountElement(id, -1);
-  if (IsDuplicate(id)) --num_duplicates_[Dimension(id.kind)];
+  if (IsDuplicate(id)) CountDuplicate(id, -1);
   mutable_slots(entry.kind).UndoAllocate(entry.slot, entry.a);
   changed_[Dimension(entry.kind)].Restore(entry.slot, entry.b);
 }
@@ -97,7 +93,7 @@ void Mesh::UndoDestroy(const JournalEntry& entry) {
       break;
   }
   const EntityId id(entry.kind, entry.slot);
-  if (IsDuplicate(id)) ++num_duplicates_[Dimension(id.kind)];
+  if (IsDuplicate(id)) CountDuplicate(id, +1);
   if (entry.kind == EntityKind::kVertex || entry.kind == EntityKind::kCell) {
     changed_[Dimension(entry.kind)].Restore(entry.slot, entry.b);
   }

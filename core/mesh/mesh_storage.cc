@@ -112,6 +112,7 @@ std::vector<std::pair<std::string, size_t>> Mesh::MemoryByArray() const {
       {"cell->faces", Bytes(cell_faces_)},
       {"vertex->edges", vertex_edges_.memory_bytes()},
       {"edge->faces", edge_faces_.memory_bytes()},
+      {"hub faces", hub_faces_.size() * (sizeof(CycleKey) + sizeof(FaceId) + 1)},
       {"hub edges", hub_edges_.capacity() * (sizeof(std::pair<VertexId, VertexId>) + sizeof(EdgeId) + 1)},
       {"journal", Bytes(journal_.entries) + Bytes(journal_.positions) + Bytes(journal_.rows)},
   };

@@ -81,6 +81,13 @@ class Slots {
   uint32_t num_live() const { return live_.size(); }
   /// One past the highest slot that was ever used.
   Slot limit() const { return limit_; }
+  /// Whether no slot is live and free or quarantined, and none lies beyond the limit.
+  bool IsSound() const {
+    bool sound = live_.Next(limit_) == kNoSlot && free_.Next(limit_) == kNoSlot;
+    free_.ForEach([&](Slot slot) { sound = sound && !live_.Test(slot); });
+    for (Slot slot : quarantine_) sound = sound && !live_.Test(slot) && !free_.Test(slot);
+    return sound;
+  }
   void Reserve(size_t slots) { born_.reserve(slots); }
   size_t memory_bytes() const {
     return live_.memory_bytes() + free_.memory_bytes() + quarantine_.size() * sizeof(Slot) +

@@ -65,6 +65,14 @@ class StampColumn {
     return std::min<size_t>(pages * kPageSlots, stamps_.size());
   }
 
+  /// Whether no stamp is later than its page says.
+  bool IsSound() const {
+    for (Slot slot = 0; slot < stamps_.size(); ++slot) {
+      if (stamps_[slot] > page_max_[slot / kPageSlots]) return false;
+    }
+    return true;
+  }
+
   Slot size() const { return stamps_.size(); }
   size_t memory_bytes() const {
     return (stamps_.size() + page_max_.size()) * sizeof(Stamp);

@@ -3,29 +3,9 @@
 #include <algorithm>
 #include <map>
 
-#include "absl/container/flat_hash_map.h"
 #include "absl/strings/str_cat.h"
 
 namespace dynmesh {
-namespace {
-
-/// A face's vertex cycle in a form that is the same for every rotation and direction.
-using CycleKey = std::array<VertexId, kMaxFaceVertices>;
-
-CycleKey KeyOf(absl::Span<const VertexId> vertices) {
-  const int n = vertices.size();
-  CycleKey best{};
-  for (int value = 0; value < 8; ++value) {
-    const FaceCode code{static_cast<uint8_t>(value)};
-    if (code.rotation() >= n) continue;
-    CycleKey key{};
-    for (int k = 0; k < n; ++k) key[k] = vertices[code.StoredVertex(k, n)];
-    if (value == 0 || key < best) best = key;
-  }
-  return best;
-}
-
-}  // namespace
 
 /// Collects violations; one method for each group of invariants.
 class MeshValidator {
@@ -39,10 +19,12 @@ class MeshValidator {
     if (!violations_.empty()) return std::move(violations_);  // the rest follows references
     CheckUpwardLists();
     CheckHubEdges();
-    CheckPrimaries<EdgeId>(EntityKind::kEdge, [this](EdgeId e) { return PairKey(e); });
-    CheckPrimaries<FaceId>(EntityKind::kFace, [this](FaceId f) { return KeyOf(mesh_.Vertices(f)); });
+    CheckHubFaces();
+    CheckPrimaries(EntityKind::kEdge);
+    CheckPrimaries(EntityKind::kFace);
     CheckBoundary();
     CheckCountsAndStamps();
+    CheckAttributes();
     CheckChecksum();
     return std::move(violations_);
   }
@@ -193,34 +175,47 @@ class MeshValidator {
     }
   }
 
+  void CheckHubFaces() {
+    size_t expected = 0;
+    ForEachLive<FaceId>(EntityKind::kFace, [&](FaceId f) {
+      const auto edges = mesh_.Edges(f);
+      const bool hubs = std::all_of(edges.begin(), edges.end(), [this](EdgeId e) {
+        return mesh_.IncidentFaces(e).size() > Mesh::kHubDegree;
+      });
+      if (!hubs || mesh_.IsDuplicate(f)) return;
+      ++expected;
+      const auto it = mesh_.hub_faces_.find(CanonicalCycle(mesh_.Vertices(f)));
+      if (it == mesh_.hub_faces_.end() || it->second != f) Report("hub face ", f.slot(), " is not indexed");
+    });
+    if (mesh_.hub_faces_.size() < expected) Report("the index of hub faces is too small");
+    for (const auto& [key, f] : mesh_.hub_faces_) {
+      if (!mesh_.IsLive(f) || CanonicalCycle(mesh_.Vertices(f)) != key) Report("hub index holds wrong face ", f.slot());
+    }
+  }
+
   // ---- Duplicates ----
 
-  template <typename EntityIdType, typename KeyFn>
-  void CheckPrimaries(EntityKind kind, KeyFn key_of) {
-    struct Group {
-      int primaries = 0;
-      bool primary_is_element = false;
-      bool has_duplicates = false;
-    };
-    std::map<decltype(key_of(EntityIdType())), Group> groups;
-    uint32_t duplicates = 0;
-    ForEachLive<EntityIdType>(kind, [&](EntityIdType id) {
-      Group& group = groups[key_of(id)];
-      group.has_duplicates |= mesh_.IsDuplicate(id);
-      duplicates += mesh_.IsDuplicate(id);
-      if (mesh_.IsDuplicate(id) && !mesh_.IsElement(id)) Report("derived duplicate ", EntityKindName(kind), " ", id.slot());
-      if (mesh_.IsDuplicate(id)) return;
-      ++group.primaries;
-      group.primary_is_element |= mesh_.IsElement(id);
-      if (group.primaries > 1) Report("two primaries, one is ", EntityKindName(kind), " ", id.slot());
-    });
-    for (const auto& [key, group] : groups) {
-      if (group.primaries == 0) Report("a duplicate ", EntityKindName(kind), " without primary");
-      if (group.has_duplicates && !group.primary_is_element) {
-        Report("a derived ", EntityKindName(kind), " with duplicates is primary");
+  void CheckPrimaries(EntityKind kind) {
+    std::map<CycleKey, int> primaries;
+    std::map<CycleKey, std::vector<Slot>> duplicates;
+    mesh_.slots(kind).live().ForEach([&](Slot slot) {
+      const EntityId id(kind, slot);
+      const CycleKey key = CanonicalCycle(mesh_.VerticesOf(id));
+      if (mesh_.IsDuplicate(id)) {
+        duplicates[key].push_back(slot);
+        if (!mesh_.IsElement(id)) Report("derived duplicate ", EntityKindName(kind), " ", slot);
+      } else if (++primaries[key] > 1) {
+        Report("two primaries, one is ", EntityKindName(kind), " ", slot);
       }
+    });
+    const auto& index = mesh_.duplicates_[Dimension(kind)];
+    if (index.size() != duplicates.size()) Report("wrong number of ", EntityKindName(kind), " duplicates indexed");
+    for (const auto& [key, slots] : duplicates) {
+      if (primaries.count(key) == 0) Report("duplicate ", EntityKindName(kind), " ", slots[0], " without primary");
+      const auto it = index.find(key);
+      const bool indexed = it != index.end() && std::equal(slots.begin(), slots.end(), it->second.begin(), it->second.end());
+      if (!indexed) Report("duplicate ", EntityKindName(kind), " ", slots[0], " is not indexed");
     }
-    if (duplicates != mesh_.num_duplicates_[Dimension(kind)]) Report("wrong count of duplicates");
   }
 
   // ---- Boundary ----
@@ -276,8 +271,21 @@ class MeshValidator {
         elements += mesh_.IsElement({kind, slot});
         CheckStamps({kind, slot});
       });
+      if (!mesh_.slots(kind).IsSound()) Report("slots of kind ", EntityKindName(kind), " are both live and free");
+      if (!mesh_.changed(kind).IsSound()) Report("a page of kind ", EntityKindName(kind), " hides a later stamp");
       if (live != mesh_.NumLive(kind)) Report("wrong count of live entities, kind ", EntityKindName(kind));
       if (elements != mesh_.NumElements(kind)) Report("wrong count of elements, kind ", EntityKindName(kind));
+    }
+  }
+
+  void CheckAttributes() {
+    for (const AttributeColumn& column : mesh_.attributes()) {
+      const Slot limit = mesh_.slots(column.spec().kind).limit();
+      bool sound = column.stamps().IsSound();
+      column.stamps().ForEachSince(0, 0, column.stamps().size(), [&](Slot slot) {
+        sound = sound && slot < limit && column.stamps().At(slot) <= mesh_.revision() + 1;
+      });
+      if (!sound) Report("attribute ", column.spec().name, " has impossible rows or stamps");
     }
   }
 

@@ -159,5 +159,17 @@ TEST(SurfaceCodecTest, DracosOwnDecoderOpensTheFile) {
   std::filesystem::remove_all(directory);
 }
 
+TEST(SurfaceCodecTest, CoordinatesBeyondDracosRangeAreRefused) {
+  for (double big : {1.0e38, 1.8e38, 3.0e38, 1.0e300}) {
+    TriangleSurface surface;
+    for (Slot slot = 0; slot < 4; ++slot) surface.vertex_slots.emplace_back(slot);
+    surface.positions = {{-big, 0, 0}, {big, 0, 0}, {0, big, 0}, {0, -big, 1}};
+    surface.triangles = {{0, 1, 2}, {0, 3, 1}};
+    EXPECT_EQ(ErrorReason(EncodeSurface(surface, 14).status()), reason::kNonFinite) << big;
+    for (Point& p : surface.positions) p = {p[0] * (1e37 / big), p[1] * (1e37 / big), p[2]};
+    EXPECT_TRUE(EncodeSurface(surface, 14).ok());
+  }
+}
+
 }  // namespace
 }  // namespace dynmesh

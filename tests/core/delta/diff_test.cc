@@ -99,9 +99,7 @@ TEST(DiffTest, PartsTakenWhileTheMeshChangesAndAClosingDiffMakeACopy) {
         EXPECT_TRUE(copy.Apply(part).ok());
         return;
       }
-      Delta closing = Diff(mesh, start);
-      closing.from_revision = from;  // what the follower had before the parts
-      EXPECT_TRUE(copy.Apply(closing).ok());
+      EXPECT_TRUE(copy.Apply(ClosingDiff(mesh, start, from)).ok());
       ExpectEqual(copy, mesh);
       cursor = DiffCursor();
       start = -1;
@@ -137,6 +135,31 @@ TEST(DiffTest, ADiffHoldsOnlyWhatChanged) {
   EXPECT_THAT(delta.OfKind(EntityKind::kCell).removed, ::testing::ElementsAre(7));
   EXPECT_EQ(delta.num_upserted_elements(), 0u);
   EXPECT_TRUE(Diff(mesh, 2).empty());
+}
+
+TEST(MirrorTest, RefusesWhatDoesNotFitAndStaysAsItWas) {
+  const Mesh mesh = OneTet();
+  Mirror copy;
+  ASSERT_TRUE(copy.Apply(Diff(mesh, 0)).ok());
+  Delta backwards;
+  EXPECT_EQ(ErrorReason(copy.Apply(backwards)), reason::kRevisionMismatch) << "it ends before this copy";
+  Delta far;
+  far.to_revision = 1;
+  far.vertex_slots = {Mirror::kMaxSlots};
+  far.positions = {Point{}};
+  EXPECT_EQ(copy.Apply(far).code(), absl::StatusCode::kResourceExhausted);
+  Delta twice;
+  twice.to_revision = 1;
+  twice.attributes.push_back({{"a", EntityKind::kVertex, AttributeType::kInt32, 1}, {0}, std::vector<uint8_t>(4)});
+  twice.attributes.push_back({{"a", EntityKind::kVertex, AttributeType::kFloat64, 16}, {0}, std::vector<uint8_t>(128)});
+  EXPECT_EQ(ErrorReason(copy.Apply(twice)), reason::kCorruptPayload);
+  Delta many;
+  many.to_revision = 1;
+  for (int i = 0; i <= kMaxAttributeColumns; ++i) {
+    many.attributes.push_back({{"a" + std::to_string(i), EntityKind::kVertex, AttributeType::kInt32, 1}, {}, {}});
+  }
+  EXPECT_EQ(ErrorReason(copy.Apply(many)), reason::kCorruptPayload);
+  ExpectEqual(copy, mesh);
 }
 
 TEST(MirrorTest, RefusesAGapAndSeesADifference) {

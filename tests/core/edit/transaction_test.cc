@@ -98,6 +98,42 @@ TEST(TransactionTest, IdsReadBeforeARebirthAreRefused) {
   EXPECT_TRUE(ApplyBatch(mesh, remove, {}).ok());
 }
 
+TEST(TransactionTest, AFaceThatBecameAnElementAgainIsAnotherElement) {
+  Mesh mesh = OneTet();
+  const auto apply = [&](Edit edit, int64_t as_of) {
+    BatchOptions options;
+    options.as_of_revision = as_of;
+    return ApplyBatch(mesh, std::vector<Edit>{std::move(edit)}, options);
+  };
+  const AddElementsEdit triangle = {ElementType::kTriangle, {0, 1, 2}};
+  const auto added = apply(triangle, 1);
+  ASSERT_TRUE(added.ok());
+  const RemoveElementsEdit remove = {EntityKind::kFace, added->results[0].new_slots};
+  ASSERT_TRUE(apply(remove, 2).ok());
+  ASSERT_TRUE(apply(triangle, 3).ok());
+  EXPECT_EQ(ErrorReason(apply(remove, 2).status()), reason::kEntityRemoved);
+  EXPECT_TRUE(apply(remove, 4).ok());
+  EXPECT_EQ(ErrorReason(ApplyBatch(mesh, std::vector<Edit>{triangle, remove}, {}).status()), reason::kEntityRemoved)
+      << "made in the same batch";
+}
+
+TEST(TransactionTest, BadKindsAndValuesAreNamed) {
+  Mesh mesh = OneTet();
+  const auto refusal = [&](Edit edit) { return ApplyBatch(mesh, std::vector<Edit>{std::move(edit)}, {}).status(); };
+  const EntityKind bad = static_cast<EntityKind>(9);
+  EXPECT_EQ(ErrorReason(refusal(RemoveElementsEdit{bad, {0}})), reason::kBadEntityKind);
+  EXPECT_EQ(ErrorReason(refusal(SetAttributeEdit{{"x", bad, AttributeType::kInt32, 1}, {0}, {0, 0, 0, 0}})),
+            reason::kBadEntityKind);
+  const AttributeSpec spec = {"x", EntityKind::kVertex, AttributeType::kFloat64, 1};
+  ASSERT_TRUE(ApplyBatch(mesh, std::vector<Edit>{AddAttributeEdit{spec}}, {}).ok());
+  std::vector<uint8_t> rows(24);
+  rows[22] = 0xf0;
+  rows[23] = 0x7f;  // the third value is infinite
+  const absl::Status infinite = refusal(SetAttributeEdit{spec, {0, 1, 2}, rows});
+  EXPECT_EQ(ErrorReason(infinite), reason::kNonFinite);
+  EXPECT_EQ(Metadata(infinite, "index"), "2");
+}
+
 TEST(TransactionTest, AnIdMadeInTheBatchCannotBeGuessed) {
   Mesh mesh = OneTet();
   const std::vector<Edit> edits = {AddElementsEdit{ElementType::kTetrahedron, {0, 1, 2, 3}},

@@ -58,6 +58,56 @@ TEST_P(MeshRandomTest, RollbackRestoresEverything) {
   }
 }
 
+TEST_P(MeshRandomTest, PilesOfThousandsOnFewVerticesStaySound) {
+  RandomEditOptions options = GetParam().options;
+  options.max_vertices = 5;  // every list becomes long, and every cycle has many duplicates
+  Mesh mesh;
+  ElementModel model;
+  RandomEditor editor(mesh, model, 3, options);
+  for (int batch = 0; batch < 12; ++batch) {
+    const ElementModel before = model;
+    mesh.BeginBatch();
+    for (int i = 0; i < 2000; ++i) editor.Edit();
+    if (batch % 4 == 3) {
+      mesh.Rollback();
+      model = before;
+    } else {
+      Commit(mesh);
+    }
+    ASSERT_THAT(Validate(mesh), ::testing::IsEmpty()) << "batch " << batch;
+    ASSERT_TRUE(ModelOf(mesh) == model) << "batch " << batch;
+  }
+  while (!model.elements.empty()) {
+    ASSERT_TRUE(mesh.RemoveElement(model.elements.begin()->first).ok());
+    model.elements.erase(model.elements.begin());
+  }
+  EXPECT_EQ(mesh.NumLive(EntityKind::kEdge), 0u);
+  EXPECT_THAT(Validate(mesh), ::testing::IsEmpty());
+}
+
+TEST_P(MeshRandomTest, ARefusedBatchLeavesNoTraceInWhatFollows) {
+  for (uint32_t seed = 1; seed <= 10; ++seed) {
+    Mesh straight, detour;
+    ElementModel straight_model, detour_model;
+    RandomEditor go(straight, straight_model, seed, GetParam().options);
+    RandomEditor wander(detour, detour_model, seed, GetParam().options);
+    for (int batch = 0; batch < 20; ++batch) {
+      const ElementModel before = detour_model;
+      detour.BeginBatch();
+      RandomEditor(detour, detour_model, seed + batch, GetParam().options).Edit();
+      RandomEditor(detour, detour_model, seed * batch, GetParam().options).Edit();
+      detour.Rollback();
+      detour_model = before;
+      for (RandomEditor* editor : {&go, &wander}) {
+        for (int i = 0; i < 8; ++i) editor->Edit();
+      }
+      Commit(straight);
+      Commit(detour);
+      ASSERT_EQ(Describe(straight), Describe(detour)) << "seed " << seed << " batch " << batch;
+    }
+  }
+}
+
 TEST_P(MeshRandomTest, RemovingAllElementsLeavesOnlyVertices) {
   Mesh mesh;
   ElementModel model;
@@ -74,6 +124,13 @@ TEST_P(MeshRandomTest, RemovingAllElementsLeavesOnlyVertices) {
   EXPECT_THAT(Validate(mesh), ::testing::IsEmpty());
 }
 
+/// Few elements go and many equal ones come.
+RandomEditOptions Piles() {
+  RandomEditOptions options;
+  options.duplicate_rate = 0.3;
+  return options;
+}
+
 RandomEditOptions Only(std::vector<ElementType> types) {
   RandomEditOptions options;
   options.types = std::move(types);
@@ -82,7 +139,7 @@ RandomEditOptions Only(std::vector<ElementType> types) {
 
 INSTANTIATE_TEST_SUITE_P(
     Mixes, MeshRandomTest,
-    ::testing::Values(Mix{"Everything", {}}, Mix{"Tets", Only({ElementType::kTetrahedron})},
+    ::testing::Values(Mix{"Everything", {}}, Mix{"Piles", Piles()}, Mix{"Tets", Only({ElementType::kTetrahedron})},
                       Mix{"Hexes", Only({ElementType::kHexahedron})},
                       Mix{"Hybrid", Only({ElementType::kTetrahedron, ElementType::kPyramid, ElementType::kPrism,
                                           ElementType::kHexahedron})},

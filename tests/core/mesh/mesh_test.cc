@@ -127,7 +127,7 @@ TEST(MeshTest, AFaceElementUsedByACellStaysAsDerived) {
   EXPECT_EQ(ErrorReason(mesh.RemoveElement(*face)), reason::kNotAnElement);
 }
 
-TEST(MeshTest, DuplicatesAreKeptAndOneTakesOverTheUsesOfAnother) {
+TEST(MeshTest, DuplicatesAreKeptAndOneTakesOverWhenThePrimaryEnds) {
   Mesh mesh = OneTet();
   const auto first = mesh.AddElement(ElementType::kTriangle, Ids({0, 1, 2}));
   const auto second = mesh.AddElement(ElementType::kTriangle, Ids({1, 0, 2}));
@@ -135,9 +135,13 @@ TEST(MeshTest, DuplicatesAreKeptAndOneTakesOverTheUsesOfAnother) {
   EXPECT_NE(*first, *second);
   EXPECT_TRUE(mesh.IsDuplicate(*second));
   ASSERT_TRUE(mesh.RemoveElement(*first).ok());
+  EXPECT_TRUE(mesh.IsLive(*first)) << "the cell still uses it";
+  EXPECT_TRUE(mesh.IsDuplicate(*second));
+  EXPECT_THAT(Validate(mesh), IsEmpty());
+  ASSERT_TRUE(mesh.RemoveElement(CellId(0)).ok());
   EXPECT_FALSE(mesh.IsLive(*first));
   EXPECT_FALSE(mesh.IsDuplicate(*second));
-  EXPECT_THAT(Row(mesh, C, F, 0), ::testing::Contains(second->slot));
+  EXPECT_EQ(mesh.FindFace(Ids({0, 1, 2})), FaceId(second->slot));
   EXPECT_THAT(Validate(mesh), IsEmpty());
 }
 
@@ -275,13 +279,39 @@ TEST(MeshTest, HubsOfThousandsOfEdgesStaySound) {
   const auto wire = mesh.AddElement(ElementType::kWireEdge, Ids({0, 1}));
   const auto twin = mesh.AddElement(ElementType::kWireEdge, Ids({1, 0}));
   ASSERT_TRUE(mesh.RemoveElement(*wire).ok());
-  EXPECT_EQ(mesh.FindEdge(VertexId(0), VertexId(1)), EdgeId(twin->slot));
+  EXPECT_EQ(mesh.FindEdge(VertexId(0), VertexId(1)), EdgeId(wire->slot)) << "faces still use it";
+  EXPECT_TRUE(mesh.IsDuplicate(*twin));
   EXPECT_THAT(Validate(mesh), IsEmpty());
   mesh.Rollback();
   EXPECT_THAT(Validate(mesh), IsEmpty());
   for (int i = 0; i < kRim; ++i) ASSERT_TRUE(mesh.RemoveElement(CellId(i)).ok());
   EXPECT_EQ(mesh.NumLive(E), 0u);
   EXPECT_THAT(Validate(mesh), IsEmpty());
+}
+
+TEST(MeshTest, TwinsHaveTheSameFacesEachAsOften) {
+  Mesh mesh;
+  AddVertices(mesh, 8);
+  Add(mesh, ElementType::kHexahedron, {0, 0, 0, 0, 0, 0, 0, 0});
+  Add(mesh, ElementType::kHexahedron, {0, 1, 2, 0, 0, 5, 6, 0});
+  EXPECT_FALSE(mesh.FindTwin(CellId(1)).valid());
+  Add(mesh, ElementType::kHexahedron, {0, 1, 2, 0, 0, 5, 6, 0});
+  EXPECT_EQ(mesh.FindTwin(CellId(1)), CellId(2));
+}
+
+TEST(MeshTest, AFaceOfManyCellsKeepsItsOrderWhenAnElementJoinsIt) {
+  Mesh mesh;
+  AddVertices(mesh, 103);
+  for (Slot apex = 3; apex < 103; ++apex) Add(mesh, ElementType::kTetrahedron, {0, 1, 2, apex});
+  const FaceId shared = mesh.FindFace(Ids({0, 1, 2}));
+  const std::vector<VertexId> order(mesh.Vertices(shared).begin(), mesh.Vertices(shared).end());
+  const EntityId same = *mesh.AddElement(ElementType::kTriangle, order);
+  EXPECT_EQ(same, EntityId(shared));
+  ASSERT_TRUE(mesh.RemoveElement(same).ok());
+  const EntityId other = *mesh.AddElement(ElementType::kTriangle, std::vector<VertexId>(order.rbegin(), order.rend()));
+  EXPECT_TRUE(mesh.IsDuplicate(other));
+  Commit(mesh);
+  ExpectEqualsOracle(mesh, ModelOf(mesh));
 }
 
 TEST(MeshTest, AnEdgeBetweenTwoOldHubsIsFound) {

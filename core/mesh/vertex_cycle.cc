@@ -1,0 +1,35 @@
+#include "core/mesh/vertex_cycle.h"
+
+#include <algorithm>
+
+namespace dynmesh {
+
+absl::optional<FaceCode> MatchFace(absl::Span<const VertexId> stored, absl::Span<const VertexId> key) {
+  const int n = stored.size();
+  if (key.size() != stored.size()) return absl::nullopt;
+  for (int value = 0; value < 8; ++value) {
+    const FaceCode code{static_cast<uint8_t>(value)};
+    if (code.rotation() >= n || stored[code.rotation()] != key[0]) continue;
+    int k = 1;
+    while (k < n && stored[code.StoredVertex(k, n)] == key[k]) ++k;
+    if (k == n) return code;
+  }
+  return absl::nullopt;
+}
+
+CycleKey CanonicalCycle(absl::Span<const VertexId> cycle) {
+  const int n = cycle.size();
+  CycleKey best;
+  best.fill(VertexId());
+  for (int value = 0; value < 8; ++value) {
+    const FaceCode code{static_cast<uint8_t>(value)};
+    if (code.rotation() >= n || cycle[code.rotation()] > best[0]) continue;
+    CycleKey candidate;
+    candidate.fill(VertexId());
+    for (int k = 0; k < n; ++k) candidate[k] = cycle[code.StoredVertex(k, n)];
+    best = std::min(best, candidate);
+  }
+  return best;
+}
+
+}  // namespace dynmesh

@@ -1,0 +1,44 @@
+#ifndef DYNMESH_CORE_MESH_VERTEX_CYCLE_H_
+#define DYNMESH_CORE_MESH_VERTEX_CYCLE_H_
+
+#include <array>
+#include <cstdint>
+
+#include "absl/types/optional.h"
+#include "absl/types/span.h"
+#include "core/mesh/element_type.h"
+#include "core/mesh/ids.h"
+
+/// Vertices of a face in order: how two lists of the same cycle lie against each other.
+namespace dynmesh {
+
+/// How a stored face lies in a cell (or another list of the same vertices): with n vertices,
+/// key[k] = stored[(rotation + k) mod n], or stored[(rotation - k) mod n] when flipped.
+struct FaceCode {
+  uint8_t value = 0;  ///< rotation | flipped << 2
+
+  constexpr int rotation() const { return value & 3; }
+  constexpr bool flipped() const { return value & 4; }
+  /// Position in the stored face of the key's vertex k.
+  constexpr int StoredVertex(int k, int n) const { return (rotation() + (flipped() ? n - k : k)) % n; }
+  /// Position in the stored face of the key's edge k, which joins key vertices k and k + 1.
+  constexpr int StoredEdge(int k, int n) const {
+    return (rotation() + (flipped() ? n - k - 1 : k)) % n;
+  }
+  /// The code by which the stored face lies in the key.
+  constexpr FaceCode Inverse(int n) const {
+    return flipped() ? *this : FaceCode{static_cast<uint8_t>((n - rotation()) % n)};
+  }
+};
+
+/// How `stored` lies against `key`, or nullopt if they are not the same cycle.
+absl::optional<FaceCode> MatchFace(absl::Span<const VertexId> stored, absl::Span<const VertexId> key);
+
+/// A cycle of up to four vertices in a form that is the same for every rotation and reflection: the smallest of
+/// them, padded with invalid ids. Of an edge: its ends, sorted.
+using CycleKey = std::array<VertexId, kMaxFaceVertices>;
+CycleKey CanonicalCycle(absl::Span<const VertexId> cycle);
+
+}  // namespace dynmesh
+
+#endif  // DYNMESH_CORE_MESH_VERTEX_CYCLE_H_
