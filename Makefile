@@ -38,8 +38,8 @@ scripts/setup.sh build test && cmake --preset $(1) > /dev/null && \
 cmake --build --preset $(1) -j $(JOBS) && ctest --preset $(1)
 endef
 
-image-test:
-	@scripts/setup.sh build
+image-test: configure
+	@cmake --build --preset dev -j $(JOBS) --target dynmesh_python
 	@docker/smoke.sh
 
 clean:

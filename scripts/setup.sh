@@ -1,21 +1,23 @@
 #!/usr/bin/env bash
 # Installs the Debian 12 packages that dynmesh builds, tests and demonstrates with. Does nothing when all are there.
 #
-# usage: scripts/setup.sh [build|test|demo|bench|sanitize]...   (default: build test demo)
+# usage: scripts/setup.sh [server|build|test|demo|bench]...   (default: build test demo)
 set -euo pipefail
 
-build_packages=(
+server_packages=(
   g++ cmake ninja-build ccache pkg-config
   libgrpc++-dev libprotobuf-dev protobuf-compiler protobuf-compiler-grpc
   libabsl-dev libspdlog-dev libdraco-dev libzstd-dev libxxhash-dev
+)
+build_packages=(
+  "${server_packages[@]}"
   python3 python3-dev python3-venv python3-setuptools python3-pybind11 pybind11-dev
   python3-grpcio python3-protobuf python3-numpy python3-meshio python3-tqdm
 )
 test_packages=(
   libgtest-dev libgmock-dev python3-pytest python3-hypothesis python3-vtk9 draco
 )
-demo_packages=(gmsh python3-vtk9)
-sanitize_packages=()
+demo_packages=(gmsh python3-matplotlib python3-pil)
 bench_packages=(libbenchmark-dev)
 
 groups=("$@")
@@ -24,9 +26,9 @@ groups=("$@")
 packages=()
 for group in "${groups[@]}"; do
   case "$group" in
-    build | test | demo | bench | sanitize) ;;
+    server | build | test | demo | bench) ;;
     *)
-      echo "setup.sh: unknown group '$group' (build, test, demo, bench, sanitize)" >&2
+      echo "setup.sh: unknown group '$group' (server, build, test, demo, bench)" >&2
       exit 2
       ;;
   esac

@@ -132,3 +132,11 @@ def test_a_column_that_is_not_there_and_one_that_is_twice(session):
         with session.edit() as tx:
             tx.add_attribute("t", "vertex")
             tx.add_attribute("t", "vertex")
+
+
+def test_a_name_that_the_mesh_has_not_is_refused(session):
+    mesh = two_tets()
+    for names in (["nope"], "nope"):
+        with pytest.raises(dynmesh.InvalidArgumentError):
+            session.import_mesh(mesh, attributes=names)
+    assert session.info().revision == 0

@@ -153,3 +153,19 @@ def test_a_stream_to_nobody_fails_every_batch():
             with pytest.raises(dynmesh.UnavailableError):
                 for _ in range(5):
                     stream.submit(tet_batch()).result(20)
+
+
+def test_a_finished_batch_takes_no_more(session):
+    with session.edit() as tx:
+        tx.add_vertices([[0, 0, 0]])
+    with pytest.raises(RuntimeError, match="has ended"):
+        tx.move_vertices([0], [[1, 1, 1]])
+    with pytest.raises(RuntimeError, match="has ended"), tx:
+        pass
+    assert session.info().revision == 1
+
+
+def test_errors_say_which_edit_and_which_item(session):
+    with pytest.raises(dynmesh.InvalidArgumentError, match=r"\(edit 1, index 2\)"), session.edit() as tx:
+        tx.add_vertices([[0, 0, 0]])
+        tx.add_vertices([[0, 0, 0], [1, 0, 0], [0, np.nan, 0]])

@@ -24,6 +24,16 @@ def blocks_of(mesh: meshio.Mesh) -> dict[str, list]:
     return joined
 
 
+@pytest.mark.parametrize("name", ["keep.inp", "keep.stl", "keep.ply"])
+def test_a_failed_export_leaves_the_old_file(session, tmp_path, name):
+    session.import_mesh(zoo())
+    (tmp_path / name).write_text("precious")
+    with pytest.raises(dynmesh.FileFormatError):
+        session.export(tmp_path / name)
+    assert [path.name for path in tmp_path.iterdir()] == [name]
+    assert (tmp_path / name).read_text() == "precious"
+
+
 def test_every_type_comes_back_with_degenerates_and_duplicates(session):
     mesh = zoo()
     session.import_mesh(mesh)

@@ -117,3 +117,12 @@ def test_there_is_no_surface_without_faces(session):
 def test_a_surface_that_was_damaged_is_data_loss(session):
     with pytest.raises(dynmesh.DynmeshError):
         dynmesh.Surface(b"DRACO not really", 1).decode()
+
+
+def test_rows_are_indexed_like_a_list(session):
+    session.import_mesh(two_tets())
+    stars = session.neighbors("vertex", "cell", [0, 4])
+    assert stars.row(-1).tolist() == stars.row(1).tolist()
+    for index in (2, -3):
+        with pytest.raises(IndexError):
+            stars.row(index)

@@ -1,8 +1,9 @@
-"""The parts of the demo `drag_hole.py`, from the shapes of elements to the picture at the end.
+"""The parts of the demo `drag_hole.py`, in the order in which it needs them.
 
-elements   quality, size and faces of elements            region     what is dragged, and along which path
-patch      the neighbourhood that moves, as the service   cavities   repairs of tetrahedra and triangles
-           describes it, and the batch that changes it    fans       repairs of all other elements
-simulation one step: read, move, repair, commit           followers  mirrors in processes of their own
-report     tables and checks                              picture    PNG and VTU of the result
+source      the mesh: gmsh's or a file          survey     what a mesh is, before and after
+region      what is dragged, along which path   simulation one step: read, move, repair, commit
+elements    quality, size, faces of elements    patch      the neighbourhood that moves, and its batch
+cavities    repairs of tetrahedra, triangles    fans       repairs of all other elements
+followers   mirrors in processes of their own   report     aligned tables, a list of checks
+results     what they show and check            picture    the surface as PNG and VTU
 """

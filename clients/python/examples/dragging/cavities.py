@@ -1,12 +1,10 @@
 """Repairs of tetrahedra and triangles: a cavity is emptied, and filled with the cone from one point.
 
-        o-------o             o-------o             A vertex that disappears, an edge that swaps, an edge that is
-       /|\     /|            / \     /|             cut in two, a new vertex in the middle of a ruin: each of them
-      / | \   / |           /   \   / |             is a cavity whose old elements are removed, and whose faces
-     o  |  \ /  |   ---->  o     \ /  |             are joined to one point, old or new. If all new elements are
-      \ |  /x\  |           \   .-o.  |             positive and fill what was emptied, the cavity was star-shaped
-       \| / | \ |            \.-    `-|             seen from that point, and the neighbours notice nothing.
-        o---o---o             o-------o
+    o-------o          o-------o      A vertex disappears, an edge swaps, an edge is cut in two, a ruin is
+    | \   / |          | \     |      built anew round a vertex in its middle: each time the elements of a
+    |   x   |   --->   |   \   |      cavity go, and its faces are joined to one point p, old or new. If all
+    | /   \ |          |     \ |      new elements are positive and fill what was emptied, the neighbours
+    o-------p          o-------p      notice nothing.
 """
 
 from __future__ import annotations
@@ -23,9 +21,9 @@ from .elements import FACES, Floats, Ints, determinants, is_cell, qualities
 NEW = -1  # stands for the new vertex in the corners of a proposal
 
 # Elements of a quality (`elements.qualities`) below this are replaced, if by better ones.
-POOR = 0.1
+POOR = 0.05
 
-_LONG, _SHORT = 3.0, 0.5  # in units of the spacing
+_LONG, _SHORT = 3.5, 0.5  # in units of the spacing
 _MAY_COST = 0.7  # part of the quality that must be left when long edges are cut and short ones disappear
 _KEEPS_SIZE = 1e-9  # relative error allowed between the sizes of what goes and what comes
 _MOST_GROWTH = 5
@@ -118,22 +116,21 @@ class Cavities:
     def repair(self, element: int) -> bool:
         """Replaces the surroundings of an element by better ones; False if nothing better was found.
 
-        An element that has become long is cut, and a short edge disappears, even if that costs a little quality.
-        For a poor one the first proposal without poor elements is taken, else the best of all.
+        An element that has become long is cut, and a short edge disappears, even if that costs a little
+        quality. For a poor one the first proposal without poor elements is taken, else the best of all.
         """
         edges = self._edges_by_length(element)
         (short, a, b), (long, c, d) = edges[0], edges[-1]
         if long > _LONG * self._spacing and self._accept(self._with_cut_edge(c, d), _MAY_COST):
             return True
-        if short < _SHORT * self._spacing and any(
-            self._accept(self._without_vertex(v), _MAY_COST) for v in (a, b)
-        ):
-            return True
+        if short < _SHORT * self._spacing:
+            if any(self._accept(self._without_vertex(v), _MAY_COST) for v in (a, b)):
+                return True
         return self.quality[element] < POOR and self._accept(self._best_of_all(element, edges), 1.0)
 
     def is_worn(self, quality: Floats, before: Floats) -> NDArray[np.bool_]:
-        """Which of the elements given deserve a repair, bool[n]: those that are inverted; of those that are worse
-        than `before` the poor, the long and the short ones."""
+        """Which of the elements given deserve a repair, bool[n]: those that are inverted; of those that are
+        worse than `before` the poor, the long and the short ones."""
         ends = self.points[self.corners[: len(quality)]]
         lengths = np.stack([np.linalg.norm(ends[:, i] - ends[:, j], axis=1) for i, j in self._edges])
         long = lengths.max(axis=0) > _LONG * self._spacing
@@ -167,11 +164,11 @@ class Cavities:
         yield self._refilled(element)
 
     def _edges_by_length(self, element: int) -> list[tuple[float, int, int]]:
-        corners = self.corners[element]
+        corners = self.corners[element].tolist()
         ends = self.points[corners]
-        return sorted(
-            (float(np.sqrt(((ends[i] - ends[j]) ** 2).sum())), int(corners[i]), int(corners[j])) for i, j in self._edges
-        )
+        i, j = np.array(self._edges).T
+        lengths = np.linalg.norm(ends[i] - ends[j], axis=1).tolist()
+        return sorted((length, corners[k], corners[l]) for length, (k, l) in zip(lengths, self._edges))
 
     def star(self, vertex: int) -> Ints:
         """Elements round a vertex, as far as they were given."""
@@ -227,15 +224,15 @@ class Cavities:
     # ---- Cones ----
 
     def _best_cone(self, cavity: Ints, faces: Ints, apexes: Ints) -> Proposal | None:
-        """The cone over `faces`, int64[f, k - 1], from that of the vertices `apexes` which is best in its worst
-        element; None if no cone fills the cavity."""
+        """The cone over `faces`, int64[f, k - 1], from that of the vertices `apexes` which is best in its
+        worst element; None if no cone fills the cavity."""
         corners = np.empty((len(apexes), len(faces), faces.shape[1] + 1), dtype=np.int64)
         corners[..., :-1] = faces
         corners[..., -1] = apexes[:, None]
         flat = (faces == apexes[:, None, None]).any(axis=2)  # faces that hold the apex already
         measures = np.where(flat, 0.0, self._measures(corners, None, cavity))
-        fits = (flat | (measures > 0)).all(axis=1) & self._fills(cavity, measures)
-        if not fits.any() or not faces.size:
+        fits = (flat | (measures > 0)).all(axis=1) & ~flat.all(axis=1) & self._fills(cavity, measures)
+        if not fits.any():
             return None
         quality = np.where(flat[fits], np.inf, self._quality(corners[fits], None, cavity))
         best = int(quality.min(axis=1).argmax())
@@ -291,7 +288,8 @@ class Cavities:
         """Whether a new face exists already outside of the cavity: where inverted elements overlap others."""
         apex = proposal.corners[0, -1]
         outside = np.setdiff1d(self.star(apex), proposal.removed)
-        new = np.setdiff1d(self._keys(self._faces_of(proposal.corners)), self._keys(self._shell(proposal.removed)))
+        shell = self._keys(self._shell(proposal.removed))
+        new = np.setdiff1d(self._keys(self._faces_of(proposal.corners)), shell)
         return bool(np.isin(new, self._keys(self._faces_of(self.corners[outside]))).any())
 
     def _faces_of(self, corners: Ints) -> Ints:

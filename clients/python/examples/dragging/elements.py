@@ -1,8 +1,7 @@
 """Shapes of elements in numpy: whether they are inverted, how large they are, and their faces.
 
-Everything here takes elements in *positive* order: seen from inside, the vertices of each face of a cell run
-against the clock. That is VTK's order but for wedges, where VTK's triangle 0 1 2 looks outward; `POSITIVE` turns
-an element over.
+Everything here takes cells in *positive* order: seen from inside, the vertices of each face run against the
+clock. That is VTK's order but for wedges, whose triangle 0 1 2 looks outward there. `FLIPPED` turns over.
 """
 
 from __future__ import annotations
@@ -44,9 +43,11 @@ _CORNERS: dict[ElementType, Ints] = {
     TETRAHEDRON: np.array([(0, 1, 2, 3), (1, 2, 0, 3), (2, 0, 1, 3), (3, 1, 0, 2)]),
     PYRAMID: np.array([(0, 1, 3, 4), (1, 2, 0, 4), (2, 3, 1, 4), (3, 0, 2, 4)]),
     PRISM: np.array([(0, 1, 2, 3), (1, 2, 0, 4), (2, 0, 1, 5), (3, 5, 4, 0), (4, 3, 5, 1), (5, 4, 3, 2)]),
-    HEXAHEDRON: np.array([(0, 1, 3, 4), (1, 2, 0, 5), (2, 3, 1, 6), (3, 0, 2, 7),
-                          (4, 7, 5, 0), (5, 4, 6, 1), (6, 5, 7, 2), (7, 6, 4, 3)]),
-}  # fmt: skip
+    HEXAHEDRON: np.array(
+        [(0, 1, 3, 4), (1, 2, 0, 5), (2, 3, 1, 6), (3, 0, 2, 7),
+         (4, 7, 5, 0), (5, 4, 6, 1), (6, 5, 7, 2), (7, 6, 4, 3)]
+    ),
+}
 
 
 def is_cell(of_type: ElementType) -> bool:
@@ -78,8 +79,8 @@ def qualities(of_type: ElementType, corners: Floats, normals: Floats | None = No
 
 
 def sizes(of_type: ElementType, corners: Floats) -> Floats:
-    """Signed volumes of cells, areas of triangles and quads: float64[...]. Faces of four vertices count as two
-    triangles round their centre.
+    """Signed volumes of cells, areas of triangles and quads: float64[...]. Faces of four vertices count as
+    four triangles round their centre.
 
     Parameters
     ----------
@@ -118,7 +119,8 @@ def _cone_volume(face: Floats, apex: Floats) -> Floats:
 
 
 def determinants(a: Floats, b: Floats, c: Floats) -> Floats:
-    """Of three vectors each: float64[...] of float64[..., 3]. On small arrays much faster than numpy's cross."""
+    """Of three vectors each: float64[...] of float64[..., 3]. On few vectors faster than numpy's cross."""
     a0, a1, a2 = a[..., 0], a[..., 1], a[..., 2]
     b0, b1, b2 = b[..., 0], b[..., 1], b[..., 2]
-    return (a1 * b2 - a2 * b1) * c[..., 0] + (a2 * b0 - a0 * b2) * c[..., 1] + (a0 * b1 - a1 * b0) * c[..., 2]
+    c0, c1, c2 = c[..., 0], c[..., 1], c[..., 2]
+    return (a1 * b2 - a2 * b1) * c0 + (a2 * b0 - a0 * b2) * c1 + (a0 * b1 - a1 * b0) * c2

@@ -1,7 +1,7 @@
 """Repairs of pyramids, prisms, hexahedra and quads: one element becomes a fan round its centre.
 
-The faces of the element stay as they are, so its neighbours notice nothing: each face of four vertices becomes
-the base of a pyramid, each triangle that of a tetrahedron, each side of a quad a triangle.
+The faces of the element stay as they are, so its neighbours notice nothing: each face of four vertices
+becomes the base of a pyramid, each triangle that of a tetrahedron, each side of a quad a triangle.
 """
 
 from __future__ import annotations

@@ -9,12 +9,12 @@ from dynmesh import ElementType, EntityKind, Session
 from dynmesh.edit import EditBatch
 from numpy.typing import NDArray
 
-from .elements import FLIPPED, Floats, Ints, is_cell, own_normals, qualities
+from .elements import FLIPPED, Floats, Ints, is_cell, own_normals, qualities, sizes
 
 
 @dataclass(frozen=True)
 class Block:
-    """Elements of one type: their ids int64[n], and their corners int64[n, k], local and in positive order."""
+    """Elements of one type: ids int64[n], and corners int64[n, k], local and in positive order."""
 
     of_type: ElementType
     ids: Ints
@@ -64,12 +64,15 @@ class Change:
         Local corners in positive order.
     lost : int64[l]
         Local vertices that have no elements any more.
+    repairs : int
+        Cavities and single elements that were filled anew.
     """
 
     points: Floats
     removed: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     added: list[tuple[ElementType, Ints]] = field(default_factory=list)
     lost: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    repairs: int = 0
 
 
 @dataclass(frozen=True)
@@ -82,19 +85,9 @@ class Sent:
     new_handles: NDArray[np.uint32]
     lost_vertices: Ints
 
-    @property
-    def items(self) -> int:
-        """Moves, removals and additions, of vertices and elements."""
-        return self.moved + self.removed + self.added
 
-
-def read_patch(
-    session: Session, kind: EntityKind, moving: Ints, revision: int, flipped: frozenset[ElementType]
-) -> Patch:
-    """Asks the service for the elements of `kind` round the vertices `moving`, int64[n].
-
-    `flipped` are the types whose elements the mesh has in negative order.
-    """
+def read_patch(session: Session, kind: EntityKind, moving: Ints, revision: int) -> Patch:
+    """Asks the service for the elements of `kind` round the vertices `moving`, int64[n]."""
     star = session.neighbors("vertex", kind, moving, as_of_revision=revision)
     found = session.entities(kind, np.unique(star.neighbors), as_of_revision=revision)
     vertices = np.union1d(found.vertices, moving).astype(np.int64)
@@ -104,8 +97,9 @@ def read_patch(
     for value in np.unique(found.types[found.is_element]):
         of_type = ElementType(int(value))
         rows = np.flatnonzero((found.types == value) & found.is_element)
-        columns = np.array(FLIPPED[of_type] if of_type in flipped else range(of_type.num_vertices))
-        local = corners[found.vertex_offsets[rows][:, None] + columns]
+        local = corners[found.vertex_offsets[rows][:, None] + np.arange(of_type.num_vertices)]
+        negative = sizes(of_type, points[local]) < 0  # then it is the order of its vertices that is
+        local[negative] = local[negative][:, FLIPPED[of_type]]
         blocks.append(Block(of_type, found.ids[rows].astype(np.int64), local))
     return Patch(revision, vertices, points, np.isin(vertices, moving), tuple(blocks))
 
@@ -113,7 +107,10 @@ def read_patch(
 def fill_batch(
     batch: EditBatch, patch: Patch, change: Change, kind: EntityKind, flipped: frozenset[ElementType]
 ) -> Sent:
-    """Adds a change to a batch of edits: moves, removals, additions."""
+    """Adds a change to a batch of edits: moves, removals, additions.
+
+    New elements of the types `flipped` are written in negative order.
+    """
     old = len(patch.vertices)
     moved = np.flatnonzero((change.points[:old] != patch.points).any(axis=1))
     moved = np.setdiff1d(moved, change.lost)

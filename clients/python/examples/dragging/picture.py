@@ -25,7 +25,7 @@ from .region import Region
 
 _SIZE_INCHES = (12.0, 6.0)
 _DPI = 100
-_COLOURS = 128  # in the file: a quarter of its size in full colour
+_COLOURS = 256  # in the file: half its size in full colour
 _MOST_OUTLINED = 40000  # faces: beyond, the lines between them would hide the colours
 _OLD = np.array([0.80, 0.82, 0.85])
 _LIGHT = np.array([0.30, 0.35, 0.89])  # towards the light, in the frame of the camera
@@ -56,7 +56,7 @@ class Surface:
 
 
 def read_surface(session: Session) -> Surface | None:
-    """The boundary of a volume, or all faces of a surface, as the service lists them; None if there are none."""
+    """The boundary of a volume, or all faces of a surface, as the service lists them; None without any."""
     volume = session.info().element_counts.cells > 0
     found = session.entities("face", session.boundary("face") if volume else None)
     if not found.ids.size:
@@ -81,7 +81,7 @@ def write_vtu(path: Path, surface: Surface) -> None:
 
 
 def draw(path: Path, surface: Surface, region: Region | None, caption: str) -> None:
-    """Paints the surface: grey where faces are as old as the import, coloured by age where they are new."""
+    """Paints the surface: grey where faces are as old as the import, by age where they are new."""
     camera = _camera(surface, region)
     seen = surface.points @ camera.T
     depth = seen[surface.corners][..., 2].mean(axis=1)
@@ -90,10 +90,11 @@ def draw(path: Path, surface: Surface, region: Region | None, caption: str) -> N
     axes = figure.add_axes((0.01, 0.11, 0.98, 0.82))
     colours, scale = _colours(surface, seen)
     outlined = len(order) <= _MOST_OUTLINED
-    axes.add_collection(PolyCollection(
-        seen[surface.corners[order]][..., :2], facecolors=colours[order],
-        edgecolors=np.clip(colours[order] - 0.22, 0, 1) if outlined else colours[order],
-        linewidths=0.3, antialiaseds=True))  # fmt: skip
+    lines = np.clip(colours - 0.22, 0, 1) if outlined else colours
+    outlines = seen[surface.corners[order]][..., :2]
+    axes.add_collection(
+        PolyCollection(outlines, facecolors=colours[order], edgecolors=lines[order], linewidths=0.3)
+    )
     if region is not None:
         _draw_path(axes, region, camera, seen)
     _frame(axes, seen)
@@ -112,14 +113,16 @@ def _save(path: Path, figure: pyplot.Figure) -> None:
 
 
 def _camera(surface: Surface, region: Region | None) -> Floats:
-    """Rows: right, up, and towards the eye."""
-    points = surface.points
-    middle = points.mean(axis=0)
-    axes = np.linalg.svd(points[:: max(len(points) // 2000, 1)] - middle, full_matrices=False)[2]
-    right, thin = axes[0] * np.sign(axes[0][np.abs(axes[0]).argmax()]), axes[2]
-    to_region = region.path(1.0) - middle if region is not None else np.zeros(3)
-    eye = thin * (1.0 if thin @ to_region > 0 or thin.sum() > 0 else -1.0)
-    eye = eye - 0.7 * np.cross(eye, right) - 0.15 * right
+    """Rows: right, up, and towards the eye, which looks across the thinnest axis at the side of the region."""
+    middle = surface.points.mean(axis=0)
+    some = surface.points[:: max(len(surface.points) // 2000, 1)] - middle
+    thin, _, right = np.linalg.eigh(some.T @ some)[1].T
+    right *= np.sign(right[np.abs(right).argmax()])
+    goal = region.path(1.0) - middle if region is not None else np.ones(3)
+    eye = thin if thin @ goal >= 0 else -thin
+    up = np.cross(eye, right)
+    tilt = 0.7 if up @ goal > 0.3 * np.linalg.norm(goal) else -0.7
+    eye = eye + tilt * up - 0.15 * right
     eye /= np.linalg.norm(eye)
     right = right - (right @ eye) * eye
     right /= np.linalg.norm(right)
@@ -138,7 +141,12 @@ def _colours(surface: Surface, seen: Floats) -> tuple[Floats, pyplot.cm.ScalarMa
 
 
 def _draw_path(axes: pyplot.Axes, region: Region, camera: Floats, seen: Floats) -> None:
-    """The way of the centre."""
+    """The way of the centre, and the rim of what it carried when it set out."""
+    angles = np.linspace(0, 2 * np.pi, 100)
+    plane = np.eye(3)[:2] if region.extent[2] == 0 else camera[:2]
+    circle = np.column_stack([np.cos(angles), np.sin(angles)])
+    rim = (region.path(0.0) + region.inner * circle @ plane) @ camera.T
+    axes.add_collection(LineCollection([rim[:, :2]], colors="black", linewidths=1.2, linestyles="dotted"))
     way = np.array([region.path(t) for t in np.linspace(0, 1, 100)]) @ camera.T
     axes.add_collection(LineCollection([way[:, :2]], colors="black", linewidths=1.2, linestyles="dashed"))
     axes.plot(*way[0, :2], "o", color="white", markeredgecolor="black", markersize=5)

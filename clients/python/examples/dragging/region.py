@@ -19,8 +19,9 @@ _LARGEST_PART = 0.25
 class Region:
     """A field of displacements around a centre that travels.
 
-    Points nearer than `inner` to the centre move as it does, those beyond `outer` stay, and in between the pull
-    fades smoothly. Each step is a small one-to-one map of space, so it is the mesh that wears out, not the shape.
+    Points nearer than `inner` to the centre move as it does, those beyond `outer` stay, and in between the
+    pull fades smoothly. Each step is a small one-to-one map of space, so it is the mesh that wears out, not
+    the shape.
 
     Attributes
     ----------
@@ -83,7 +84,8 @@ def ball_region(points: Floats, start: Floats) -> Region | None:
 
 def _directions(points: Floats, outward: Floats) -> tuple[Floats, Floats]:
     """Unit vectors: outward, and across it within the plane or space that the points span."""
-    spread, axes = np.linalg.svd(points[:: max(len(points) // 1000, 1)] - points.mean(axis=0), full_matrices=False)[1:]
+    some = points[:: max(len(points) // 1000, 1)] - points.mean(axis=0)
+    spread, axes = np.linalg.svd(some, full_matrices=False)[1:]
     spanned = axes[spread > 1e-6 * spread[0]]
     out = outward / np.linalg.norm(outward) if np.linalg.norm(outward) > 0 else spanned[0]
     across = [axis - (axis @ out) * out for axis in spanned]

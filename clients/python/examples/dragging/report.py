@@ -36,6 +36,11 @@ def rate(count: float, seconds: float) -> str:
     return f"{count / seconds:,.0f} /s" if seconds > 0 else "-"
 
 
+def part(of: float, whole: float) -> float:
+    """`of` / `whole`; 0 of nothing."""
+    return of / whole if whole else 0.0
+
+
 def _text(cell: Cell) -> str:
     if isinstance(cell, str):
         return cell

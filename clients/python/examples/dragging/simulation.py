@@ -14,13 +14,13 @@ from dynmesh import ElementType, EntityKind, Session
 from numpy.typing import NDArray
 
 from .cavities import POOR, Cavities
-from .elements import Floats, Ints
+from .elements import Floats, Ints, sizes
 from .fans import CENTRE, fan
 from .patch import Block, Change, Patch, Sent, fill_batch, read_patch
 from .region import Region
 from .survey import Survey
 
-_MOST_REPAIRS = 600  # tried in one step
+_MOST_REPAIRS = 600  # tried in one attempt
 _MOST_ATTEMPTS = 8  # at a step, each holding more vertices back
 
 _SIMPLEX = {EntityKind.CELL: ElementType.TETRAHEDRON, EntityKind.FACE: ElementType.TRIANGLE}
@@ -39,8 +39,12 @@ class StepReport:
         Items of the batch.
     inverted : int
         Elements that the move alone would have inverted.
+    repairs : int
+        Cavities that were emptied and filled anew.
     held : int
         Vertices that had to stay where they were.
+    size_error : float
+        By how much the volume of what was added differs from that of what was removed.
     read_s, repair_s, commit_s : float
         Time for the queries, for our own work, and for the commit.
     """
@@ -50,7 +54,9 @@ class StepReport:
     removed: int
     added: int
     inverted: int
+    repairs: int
     held: int
+    size_error: float
     read_s: float
     repair_s: float
     commit_s: float
@@ -92,12 +98,23 @@ class Simulation:
         pulled = patch.points + self._region.pull(patch.points, here)[:, None] * (there - here)
         target = np.where(patch.moving[:, None], pulled, patch.points)
         have_read = time.perf_counter()
-        change, inverted, held = self._repaired(patch, target)
+        change, held = self._repaired(patch, target)
         repaired = time.perf_counter()
         sent = self._commit(patch, change)
         committed = time.perf_counter()
-        return StepReport(self._revision, sent.moved, sent.removed, sent.added, inverted, held,
-                          have_read - started, repaired - have_read, committed - repaired)  # fmt: skip
+        return StepReport(
+            revision=self._revision,
+            moved=sent.moved,
+            removed=sent.removed,
+            added=sent.added,
+            inverted=sum(_count_inverted(block, patch, target) for block in patch.blocks),
+            repairs=change.repairs,
+            held=held,
+            size_error=_size_error(patch, change),
+            read_s=have_read - started,
+            repair_s=repaired - have_read,
+            commit_s=committed - repaired,
+        )
 
     # ---- Talking to the service ----
 
@@ -105,15 +122,17 @@ class Simulation:
         points = self._session.positions(self._reachable, as_of_revision=self._revision)
         moving = self._reachable[self._region.pull(points, centre) > 0]
         if self._kind is None:
-            return Patch(self._revision, moving, self._session.positions(moving), np.ones(len(moving), bool), ())
-        patch = read_patch(self._session, self._kind, moving, self._revision, self._flipped)
+            points = self._session.positions(moving, as_of_revision=self._revision)
+            return Patch(self._revision, moving, points, np.ones(len(moving), dtype=bool), ())
+        patch = read_patch(self._session, self._kind, moving, self._revision)
         if self._spacing is None:
             self._spacing = _median_spacing(patch)
         return patch
 
     def _commit(self, patch: Patch, change: Change) -> Sent:
         with self._session.edit(if_revision=self._revision, as_of_revision=self._revision) as tx:
-            sent = fill_batch(tx, patch, change, self._kind or EntityKind.CELL, self._flipped)
+            kind = self._kind or EntityKind.CELL
+            sent = fill_batch(tx, patch, change, kind, self._flipped)
         self._revision = tx.result.revision
         kept = np.setdiff1d(self._reachable, sent.lost_vertices)
         self._reachable = np.union1d(kept, tx.result.resolve(sent.new_handles).astype(np.int64))
@@ -121,21 +140,19 @@ class Simulation:
 
     # ---- Repairing ----
 
-    def _repaired(self, patch: Patch, target: Floats) -> tuple[Change, int, int]:
-        """A change that leaves nothing inverted that was not before, how many elements the move alone would have
-        inverted, and how many vertices are held back for it."""
-        inverted = sum(int(_newly_inverted(block, patch, target).sum()) for block in patch.blocks)
+    def _repaired(self, patch: Patch, target: Floats) -> tuple[Change, int]:
+        """A change that leaves nothing inverted that was not before, and how many vertices it holds back."""
         held = np.zeros(len(patch.points), dtype=bool)
         for _ in range(_MOST_ATTEMPTS):
             points = np.where(held[:, None], patch.points, target)
             change, stuck = self._attempt(patch, points)
             if not stuck.size:
-                return change, inverted, int((held & patch.moving).sum())
+                return change, int((held & patch.moving).sum())
             held[stuck] = True
-        return Change(patch.points), inverted, int(patch.moving.sum())
+        return Change(patch.points), int(patch.moving.sum())
 
     def _attempt(self, patch: Patch, points: Floats) -> tuple[Change, Ints]:
-        """A change with the vertices at `points`, and the local vertices of elements that it leaves inverted."""
+        """A change with the vertices at `points`, and the vertices of elements that it leaves inverted."""
         change, stuck = Change(points), [np.zeros(0, dtype=np.int64)]
         simplex = _SIMPLEX.get(self._kind) if self._kind else None
         for block in patch.blocks:
@@ -149,9 +166,12 @@ class Simulation:
     def _repair_simplices(self, block: Block, patch: Patch, change: Change) -> Ints:
         quality = block.qualities(change.points, patch.points)
         before = block.qualities(patch.points, patch.points)
-        cavities = Cavities(block.of_type, block.corners, quality, change.points, patch.moving,
-                            self._pinned_in(patch), self._spacing or 0.0)  # fmt: skip
-        _repair_worst_first(cavities, np.flatnonzero(cavities.is_worn(quality, before)))
+        pinned, spacing = self._pinned_in(patch), self._spacing or 0.0
+        cavities = Cavities(
+            block.of_type, block.corners, quality, change.points, patch.moving, pinned, spacing
+        )
+        worn = np.flatnonzero(cavities.is_worn(quality, before))
+        change.repairs += _repair_worst_first(cavities, worn)
         given = len(block.ids)
         change.points = cavities.points
         change.removed = np.concatenate([change.removed, block.ids[~cavities.alive[:given]]])
@@ -169,13 +189,12 @@ class Simulation:
         return pinned
 
 
-def _repair_worst_first(cavities: Cavities, worn: Ints) -> None:
-    for element in worn[np.argsort(cavities.quality[worn])][:_MOST_REPAIRS]:
-        if cavities.alive[element]:
-            cavities.repair(int(element))
-    for element in worn[cavities.quality[worn] <= 0]:  # once more, now that their neighbours are better
-        if cavities.alive[element]:
-            cavities.repair(int(element))
+def _repair_worst_first(cavities: Cavities, worn: Ints) -> int:
+    """Repairs what can be repaired of the elements `worn`; returns how often."""
+    order = worn[np.argsort(cavities.quality[worn])][:_MOST_REPAIRS]
+    again = order[cavities.quality[order] <= 0]  # when their neighbours are better
+    elements = np.concatenate([order, again]).tolist()
+    return sum(cavities.repair(element) for element in elements if cavities.alive[element])
 
 
 def _repair_by_fans(block: Block, patch: Patch, change: Change) -> Ints:
@@ -183,7 +202,8 @@ def _repair_by_fans(block: Block, patch: Patch, change: Change) -> Ints:
     quality = block.qualities(change.points, patch.points)
     before = block.qualities(patch.points, patch.points)
     gone, stuck = [], [np.zeros(0, dtype=np.int64)]
-    for row in np.flatnonzero((quality <= 0) | ((quality < POOR) & (quality < 0.999 * before))):
+    worn = np.flatnonzero((quality <= 0) | ((quality < POOR) & (quality < 0.999 * before)))
+    for row in worn:
         made = fan(block.of_type, block.corners[row], change.points)
         if made is not None:
             for of_type, corners in made.blocks:
@@ -193,11 +213,21 @@ def _repair_by_fans(block: Block, patch: Patch, change: Change) -> Ints:
         elif quality[row] <= 0 < before[row]:
             stuck.append(block.corners[row])
     change.removed = np.concatenate([change.removed, np.array(gone, dtype=np.int64)])
+    change.repairs += len(gone)
     return np.concatenate(stuck)
 
 
-def _newly_inverted(block: Block, patch: Patch, target: Floats) -> Mask:
-    return (block.qualities(target, patch.points) <= 0) & (block.qualities(patch.points, patch.points) > 0)
+def _count_inverted(block: Block, patch: Patch, target: Floats) -> int:
+    inverted = block.qualities(target, patch.points) <= 0
+    return int((inverted & (block.qualities(patch.points, patch.points) > 0)).sum())
+
+
+def _size_error(patch: Patch, change: Change) -> float:
+    new = sum(float(sizes(of_type, change.points[corners]).sum()) for of_type, corners in change.added)
+    for block in patch.blocks:
+        gone = block.corners[np.isin(block.ids, change.removed)]
+        new -= float(sizes(block.of_type, change.points[gone]).sum())
+    return new
 
 
 def _median_spacing(patch: Patch) -> float:

@@ -15,14 +15,15 @@ from dynmesh.files import read_mesh
 from .region import Region, hole_region
 
 _PLATE = Path(__file__).parent.parent / "plate_with_hole.geo"
-_HOLE = {"hole_x": 3.0, "hole_y": 3.0, "radius": 0.8, "travel": 5.0}
+_NUMBERS = {"hole_x": 3.0, "hole_y": 3.0, "thickness": 0.6, "radius": 0.8}
+_TRAVEL = 5.5
 _NODES = {t.meshio_name: t.num_vertices for t in ElementType}
 
 
 def mesh_plate(directory: Path) -> Path:
     """Lets gmsh mesh the plate; returns the file."""
     path = directory / "plate_with_hole.msh"
-    numbers = [word for name, value in _HOLE.items() for word in ("-setnumber", name, str(value))]
+    numbers = [word for name, value in _NUMBERS.items() for word in ("-setnumber", name, str(value))]
     command = ["gmsh", "-3", str(_PLATE), "-o", str(path), "-v", "2", *numbers]
     subprocess.run(command, check=True, stdin=subprocess.DEVNULL)
     return path
@@ -30,8 +31,8 @@ def mesh_plate(directory: Path) -> Path:
 
 def plate_region() -> Region:
     """The hole of the plate."""
-    centre = np.array([_HOLE["hole_x"], _HOLE["hole_y"], 0.0])
-    return hole_region(centre, _HOLE["radius"], _HOLE["travel"])
+    centre = np.array([_NUMBERS["hole_x"], _NUMBERS["hole_y"], _NUMBERS["thickness"]])
+    return hole_region(centre, _NUMBERS["radius"], _TRAVEL)
 
 
 def load(path: Path) -> tuple[meshio.Mesh, list[str]]:

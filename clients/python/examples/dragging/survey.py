@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,9 +22,9 @@ class Survey:
     kind : EntityKind or None
         CELL, or FACE where there are no cells; None where there are neither.
     flipped : frozenset of ElementType
-        Types that the mesh has in negative order.
+        Types most of whose elements are in negative order (`elements`).
     num_elements, num_inverted : int
-        All, and those that are inverted or flat.
+        All, and those that are flat, concave, or turned against most others of their type.
     size : float
         Volume, or area of a surface.
     vertex_ids : int64[n]
@@ -43,31 +44,32 @@ class Survey:
 
 
 def survey(snapshot: Snapshot, flipped: frozenset[ElementType] | None = None) -> Survey:
-    """Measures a snapshot. `flipped`: as found by an earlier survey; default: by the sign of each type's volume."""
+    """Measures a snapshot. `flipped`: as an earlier survey found them; default: by majority."""
     kind = next((k for k in (EntityKind.CELL, EntityKind.FACE) if snapshot.blocks_of(k)), None)
     positions = np.zeros((int(snapshot.vertex_ids.max(initial=0)) + 1, 3))
     positions[snapshot.vertex_ids] = snapshot.positions
     turned, num_elements, num_inverted, size = set(), 0, 0, 0.0
     for block in snapshot.blocks_of(kind) if kind else ():
-        block_size, inverted = _measured(block.type, positions, block.vertices)
-        if block.type in flipped if flipped is not None else block_size < 0:
+        volumes = _in_parts(sizes, block.type, positions, block.vertices)
+        corners = block.vertices
+        if block.type in flipped if flipped is not None else (volumes < 0).sum() > len(volumes) / 2:
             turned.add(block.type)
-            block_size, inverted = _measured(block.type, positions, block.vertices[:, FLIPPED[block.type]])
-        num_elements += len(block.ids)
-        num_inverted += inverted
-        size += block_size
-    return Survey(kind, frozenset(turned), num_elements, num_inverted, size,
-                  snapshot.vertex_ids.astype(np.int64), snapshot.positions, _pinned(snapshot, kind))  # fmt: skip
+            corners = corners[:, FLIPPED[block.type]]
+        num_elements += len(corners)
+        size += float(np.abs(volumes).sum())
+        if is_cell(block.type):
+            num_inverted += int((_in_parts(qualities, block.type, positions, corners) <= 0).sum())
+    ids = snapshot.vertex_ids.astype(np.int64)
+    pinned = _pinned(snapshot, kind)
+    return Survey(kind, frozenset(turned), num_elements, num_inverted, size, ids, snapshot.positions, pinned)
 
 
-def _measured(of_type: ElementType, positions: Floats, corners: Ints) -> tuple[float, int]:
-    """Size of all elements, and how many are not positive."""
-    size, inverted = 0.0, 0
-    for begin in range(0, len(corners), _AT_ONCE):
-        part = positions[corners[begin : begin + _AT_ONCE]]
-        size += float(sizes(of_type, part).sum())
-        inverted += int((qualities(of_type, part) <= 0).sum()) if is_cell(of_type) else 0
-    return size, inverted
+def _in_parts(
+    measure: Callable[[ElementType, Floats], Floats], of_type: ElementType, positions: Floats, corners: Ints
+) -> Floats:
+    """`measure` of all elements, without copying all their corners at once."""
+    parts = [corners[begin : begin + _AT_ONCE] for begin in range(0, len(corners), _AT_ONCE)]
+    return np.concatenate([measure(of_type, positions[part]) for part in parts])
 
 
 def _pinned(snapshot: Snapshot, kind: EntityKind | None) -> Ints:

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 import grpc
 
-from .errors import UnavailableError, from_rpc_error
+from .errors import InvalidArgumentError, UnavailableError, from_rpc_error
 
 Reply = TypeVar("Reply")
 
@@ -79,7 +79,10 @@ class Caller:
             call.cancel()  # type: ignore[attr-defined]
 
     def _seconds(self, timeout: float | None) -> float:
-        return self._timeout if timeout is None else timeout
+        seconds = self._timeout if timeout is None else timeout
+        if not seconds > 0:  # NaN too
+            raise InvalidArgumentError(f"timeout must be more than 0 seconds, not {seconds}", reason="BAD_ARGUMENT")
+        return seconds
 
 
 def _once(method: Callable[..., Reply], request: Any, deadline: float) -> Reply:

@@ -116,12 +116,12 @@ def _add_reading(commands: Any) -> None:
     export = _command(commands, "export", _export, "Write a session to a mesh file.")
     export.add_argument("name", metavar="NAME")
     export.add_argument(
-        "file", metavar="FILE", help="its extension chooses the format: .vtu, .msh, .xdmf, ..."
+        "file", metavar="FILE", help="its extension chooses meshio's format: .vtu holds everything"
     )
     export.add_argument("--no-slots", action="store_true", help="leave out the ids (dynmesh:slot)")
     follow = _command(commands, "watch", _watch, "Follow a session: a line for each step, until interrupted.")
     follow.add_argument("name", metavar="NAME")
-    follow.add_argument("--count", metavar="N", type=int, help="end after so many steps")
+    follow.add_argument("--count", metavar="N", type=_positive, help="end after so many steps")
     follow.add_argument("--codec", choices=("auto", "draco", "zstd", "raw"), default="auto", help="(auto)")
     follow.add_argument(
         "--min-interval", metavar="SECONDS", type=float, default=0.0, help="between steps (0)"
@@ -206,7 +206,16 @@ def _client(args: argparse.Namespace) -> Client:
 
 
 def _confirmed(question: str) -> bool:
-    return input(f"{question} [y/N] ").strip().lower() in ("y", "yes")
+    try:
+        return input(f"{question} [y/N] ").strip().lower() in ("y", "yes")
+    except EOFError:
+        return False
+
+
+def _positive(text: str) -> int:
+    if (number := int(text)) < 1:
+        raise argparse.ArgumentTypeError(f"{text} is not a positive number")
+    return number
 
 
 def _names(text: str) -> list[str]:

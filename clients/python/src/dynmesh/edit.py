@@ -184,6 +184,7 @@ class Transaction(EditBatch):
         super().__init__()
         self._commit = commit
         self._result: EditResult | None = None
+        self._ended = False
 
     @property
     def result(self) -> EditResult:
@@ -195,13 +196,23 @@ class Transaction(EditBatch):
         return self._result
 
     def __enter__(self) -> Transaction:
+        self._check_open()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        self._ended = True
         if kind is None:
             self._result = self._commit(self)
+
+    def _append(self, **kind: Any) -> int:
+        self._check_open()
+        return super()._append(**kind)
+
+    def _check_open(self) -> None:
+        if self._ended:
+            raise RuntimeError("the batch has ended with its with block: begin another with session.edit()")
 
 
 def _check_same_length(what: str, length: int, wanted: int) -> None:

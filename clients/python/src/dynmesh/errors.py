@@ -40,7 +40,9 @@ class DynmeshError(Exception):
         self.metadata = dict(metadata or {})
 
     def __str__(self) -> str:
-        return f"{self.message} [{self.reason}]" if self.reason else self.message
+        where = ", ".join(f"{key} {self.metadata[key]}" for key in ("edit", "index") if key in self.metadata)
+        text = f"{self.message} ({where})" if where else self.message
+        return f"{text} [{self.reason}]" if self.reason else text
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _rebuild, (type(self), self.message, self.reason, self.metadata)

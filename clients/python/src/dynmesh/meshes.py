@@ -75,9 +75,10 @@ def from_meshio(mesh: meshio.Mesh, attributes: Collection[str] | None = None) ->
     Raises
     ------
     InvalidArgumentError
-        A type of cells that dynmesh has not (the message names the block), or data that neither float64 nor
-        int32 holds exactly.
+        A type of cells that dynmesh has not (the message names the block), a name in `attributes` that the mesh
+        has not, or data that neither float64 nor int32 holds exactly.
     """
+    _check_names(mesh, attributes)
     kinds: list[EntityKind | None] = []
     blocks = []
     for number, block in enumerate(mesh.cells):
@@ -99,6 +100,18 @@ def as_mesh_data(mesh: Any, cells: Cells | None, attributes: Collection[str] | N
     if hasattr(mesh, "points") and hasattr(mesh, "cells"):
         return from_meshio(mesh, attributes)
     return from_arrays(mesh, ())
+
+
+def _check_names(mesh: meshio.Mesh, attributes: Collection[str] | None) -> None:
+    if isinstance(attributes, str):
+        raise InvalidArgumentError("`attributes` is a collection of names, not a string", reason="BAD_ARGUMENT")
+    there = set(mesh.point_data) | set(mesh.cell_data)
+    if missing := sorted(set(attributes or ()) - there):
+        raise InvalidArgumentError(
+            f"the mesh has no data named {', '.join(missing)}; it has {', '.join(sorted(there)) or 'none'}",
+            reason="UNKNOWN_ATTRIBUTE",
+            metadata={"attribute": missing[0]},
+        )
 
 
 def _block(name: ElementType | str, rows: ArrayLike) -> tuple[ElementType, Ids]:

@@ -40,7 +40,7 @@ class MirrorStats:
     geometry_bytes: int = 0
     reconnects: int = 0
     refollows: int = 0
-    latencies_s: deque[float] = field(default_factory=lambda: deque(maxlen=_KEPT_LATENCIES))
+    latencies_s: deque[float] = field(default_factory=lambda: deque(maxlen=_KEPT_LATENCIES), repr=False)
 
     def count(self, message: Any) -> None:
         """Adds a SubscribeResponse."""

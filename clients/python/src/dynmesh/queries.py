@@ -44,7 +44,10 @@ class Csr(NamedTuple):
     revision: int
 
     def row(self, index: int) -> Ids:
-        """Neighbours of ``ids[index]``."""
+        """Neighbours of ``ids[index]``; negative indices count from the end. Raises IndexError."""
+        if not -len(self.ids) <= index < len(self.ids):
+            raise IndexError(f"row {index} of {len(self.ids)}")
+        index %= len(self.ids)
         return self.neighbors[self.offsets[index] : self.offsets[index + 1]]
 
     def to_dict(self) -> dict[int, list[int]]:
