@@ -14,8 +14,8 @@ namespace dynmesh {
 namespace {
 
 constexpr char kMethod[] = "/grpc.health.v1.Health/Check";
-// HealthCheckResponse with its only field, status = 1, set to SERVING = 1. The proto is in no Debian package, and
-// for one number none is needed.
+// HealthCheckResponse with its only field, status = 1, set to SERVING = 1. The proto is in no Debian package,
+// and for one number none is needed.
 constexpr char kServing[] = "\x08\x01";
 
 std::string ToString(const grpc::ByteBuffer& buffer) {

@@ -4,6 +4,7 @@
 #include <sys/prctl.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
@@ -185,6 +186,10 @@ int Serve() {
 int Main(int argc, char** argv) {
   absl::SetProgramUsageMessage(kUsage);
   absl::FlagsUsageConfig config;
+  config.normalize_filename = [](absl::string_view file) {
+    return std::string(
+        file.substr(std::min(file.size(), file.rfind("server/"))));  // no path of a build machine
+  };
   config.contains_helpshort_flags = [](absl::string_view file) { return file.find("main.cc") != file.npos; };
   config.contains_help_flags = config.contains_helpshort_flags;
   config.version_string = [] { return std::string("dynmeshd " DYNMESH_VERSION "\n"); };

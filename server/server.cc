@@ -2,7 +2,10 @@
 
 #include <arpa/inet.h>
 #include <grpc/support/log.h>
+#include <sys/socket.h>
 #include <sys/stat.h>
+#include <sys/un.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <thread>
@@ -11,7 +14,6 @@
 #include "absl/strings/match.h"
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
-#include "absl/synchronization/mutex.h"
 #include "absl/time/clock.h"
 #include "grpcpp/ext/proto_server_reflection_plugin.h"
 #include "grpcpp/health_check_service_interface.h"
@@ -75,6 +77,22 @@ void LogForGrpc(gpr_log_func_args* args) {
   spdlog::log(level, "grpc message=\"{}\"", args->message);
 }
 
+/// Whether somebody accepts connections at the unix socket `path`: gRPC would take its place without a word.
+bool IsServed(const std::string& path) {
+  sockaddr_un address = {};
+  address.sun_family = AF_UNIX;
+  if (path.size() >= sizeof(address.sun_path)) return false;
+  std::copy(path.begin(), path.end(), address.sun_path);
+  const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  const bool served = fd >= 0 && connect(fd, reinterpret_cast<sockaddr*>(&address), sizeof(address)) == 0;
+  if (fd >= 0) close(fd);
+  return served;
+}
+
+absl::Status CannotListen(absl::string_view address) {
+  return absl::UnavailableError(absl::StrCat("cannot listen on ", address));
+}
+
 Executor::Options ExecutorOptions(const char* name, int threads, const Limits& limits) {
   return {name, threads, limits.max_queued_tasks};
 }
@@ -89,8 +107,9 @@ int QuickThreads(const ServerOptions& options) {
 absl::Status CheckLoopback(absl::string_view address) {
   DYNMESH_ASSIGN_OR_RETURN(const HostAndPort parts, SplitAddress(address));
   if (IsLoopbackHost(parts.host)) return absl::OkStatus();
-  return BadAddress(address, "can be reached from other machines, and nothing would be encrypted or authenticated: "
-                             "allow that with --allow_insecure");
+  return BadAddress(address,
+                    "can be reached from other machines, and nothing would be encrypted or authenticated: "
+                    "allow that with --allow_insecure");
 }
 
 /// Members are destroyed from the last to the first: gRPC, then the threads, then the sessions.
@@ -114,8 +133,9 @@ class Server::Impl {
     heavy_.Stop();
   }
 
-  absl::StatusOr<std::vector<std::string>> Listen(const ServerOptions& options);
+  absl::Status Listen(const ServerOptions& options);
   void Drain(absl::Duration timeout);
+  const std::vector<std::string>& addresses() const { return addresses_; }
   SessionRegistry& registry() { return registry_; }
 
  private:
@@ -127,8 +147,9 @@ class Server::Impl {
   OpenStreams streams_;
   SessionRegistry registry_;
   std::vector<std::unique_ptr<grpc::Service>> services_;
-  absl::Mutex drain_mu_;
+  Mutex drain_mu_;
   bool drained_ ABSL_GUARDED_BY(drain_mu_) = false;
+  std::vector<std::string> addresses_;
   std::unique_ptr<grpc::Server> grpc_;
 };
 
@@ -145,41 +166,33 @@ void Server::Impl::Configure(const Limits& limits, grpc::ServerBuilder& builder)
   builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, kMinPingIntervalMs);
 }
 
-absl::StatusOr<std::vector<std::string>> Server::Impl::Listen(const ServerOptions& options) {
+absl::Status Server::Impl::Listen(const ServerOptions& options) {
   grpc::ServerBuilder builder;
   Configure(options.limits, builder);
-  std::vector<std::string> addresses;
-  std::vector<int> ports(options.listen.size(), -1);
-  for (size_t i = 0; i < options.listen.size(); ++i) {
-    builder.AddListeningPort(options.listen[i], grpc::InsecureServerCredentials(), &ports[i]);
-  }
-  int unix_port = -1;
-  const std::string unix_target = absl::StrCat("unix:", options.unix_socket);
+  std::vector<std::string> targets = options.listen;
   if (!options.unix_socket.empty()) {
-    builder.AddListeningPort(unix_target, grpc::InsecureServerCredentials(), &unix_port);
+    if (IsServed(options.unix_socket)) return CannotListen(options.unix_socket);
+    targets.push_back(absl::StrCat("unix:", options.unix_socket));
+  }
+  std::vector<int> ports(targets.size(), 0);
+  for (size_t i = 0; i < targets.size(); ++i) {
+    builder.AddListeningPort(targets[i], grpc::InsecureServerCredentials(), &ports[i]);
   }
   const mode_t mask = umask(0077);  // so that the socket's file is the user's own from the beginning
   grpc_ = builder.BuildAndStart();
   umask(mask);
-  for (size_t i = 0; i < options.listen.size(); ++i) {
-    if (grpc_ == nullptr || ports[i] <= 0) {
-      return absl::UnavailableError(absl::StrCat("cannot listen on ", options.listen[i]));
-    }
-    DYNMESH_ASSIGN_OR_RETURN(const HostAndPort parts, SplitAddress(options.listen[i]));
-    addresses.push_back(absl::StrCat(parts.host, ":", ports[i]));
-  }
-  if (!options.unix_socket.empty()) {
-    if (grpc_ == nullptr || unix_port <= 0) {
-      return absl::UnavailableError(absl::StrCat("cannot listen on ", unix_target));
-    }
-    addresses.push_back(unix_target);
+  for (size_t i = 0; i < targets.size(); ++i) {
+    if (grpc_ == nullptr || ports[i] <= 0) return CannotListen(targets[i]);
+    const bool has_port = i < options.listen.size();
+    addresses_.push_back(has_port ? absl::StrCat(targets[i].substr(0, targets[i].rfind(':')), ":", ports[i])
+                                  : targets[i]);
   }
   for (const char* name : kServiceNames) grpc_->GetHealthCheckService()->SetServingStatus(name, true);
-  return addresses;
+  return absl::OkStatus();
 }
 
 void Server::Impl::Drain(absl::Duration timeout) {
-  absl::MutexLock lock(&drain_mu_);
+  MutexLock lock(&drain_mu_);
   if (drained_ || grpc_ == nullptr) return;
   drained_ = true;
   spdlog::info("draining timeout_ms={}", absl::ToInt64Milliseconds(timeout));
@@ -203,14 +216,14 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(const ServerOptions& optio
   grpc::EnableDefaultHealthCheckService(true);
   grpc::reflection::InitProtoReflectionServerBuilderPlugin();
   auto impl = std::make_unique<Impl>(options);
-  DYNMESH_ASSIGN_OR_RETURN(std::vector<std::string> addresses, impl->Listen(options));
-  std::unique_ptr<Server> server(new Server(std::move(impl)));
-  server->addresses_ = std::move(addresses);
-  return server;
+  DYNMESH_RETURN_IF_ERROR(impl->Listen(options));
+  return std::unique_ptr<Server>(new Server(std::move(impl)));
 }
 
 Server::Server(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Server::~Server() = default;
+
+const std::vector<std::string>& Server::addresses() const { return impl_->addresses(); }
 
 void Server::Drain(absl::Duration timeout) { impl_->Drain(timeout); }
 

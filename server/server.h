@@ -43,7 +43,7 @@ class Server {
   ~Server();
 
   /// What the server really listens on, as gRPC targets: "127.0.0.1:41873", "unix:/run/dynmesh.sock".
-  const std::vector<std::string>& addresses() const { return addresses_; }
+  const std::vector<std::string>& addresses() const;
 
   /// Stops: health says NOT_SERVING, subscriptions and edit streams end with UNAVAILABLE SHUTTING_DOWN, new
   /// calls are refused, calls under way get up to `timeout`, and what is left then is cancelled. Returns when
@@ -57,7 +57,6 @@ class Server {
   explicit Server(std::unique_ptr<Impl> impl);
 
   std::unique_ptr<Impl> impl_;
-  std::vector<std::string> addresses_;
 };
 
 }  // namespace dynmesh

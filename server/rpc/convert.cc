@@ -11,10 +11,10 @@ namespace dynmesh {
 static_assert(std::endian::native == std::endian::little, "arrays travel as they lie in memory");
 
 absl::Status BadArrayLength(absl::string_view field, size_t bytes, size_t record_bytes) {
-  return InvalidArgument(reason::kBadArrayLength,
-                         absl::StrCat(field, " has ", bytes, " bytes, which is no multiple of ", record_bytes),
-                         {{"field", std::string(field)},
-                          {"index", absl::StrCat(bytes / record_bytes)}});
+  return InvalidArgument(
+      reason::kBadArrayLength,
+      absl::StrCat(field, " has ", bytes, " bytes, which is no multiple of ", record_bytes),
+      {{"field", std::string(field)}, {"index", absl::StrCat(bytes / record_bytes)}});
 }
 
 absl::StatusOr<EntityKind> ToEntityKind(int kind, absl::string_view field) {

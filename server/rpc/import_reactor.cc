@@ -65,7 +65,7 @@ absl::Status ImportReactor::BeginImport(const v1::ImportHeader& header) {
 
 void ImportReactor::Announce() {
   {
-    absl::MutexLock lock(&mu_);
+    MutexLock lock(&mu_);
     phase_ = Phase::kAnnouncing;
     if (writing_) return;  // OnWriteDone comes back here
   }
@@ -76,7 +76,7 @@ void ImportReactor::OnWriteDone(bool ok) {
   Phase phase;
   absl::Status end;
   {
-    absl::MutexLock lock(&mu_);
+    MutexLock lock(&mu_);
     writing_ = false;
     phase = phase_;
     end = end_;
@@ -104,7 +104,7 @@ void ImportReactor::OnProgress(uint64_t done, uint64_t total) { WriteProgress(kB
 
 void ImportReactor::WriteProgress(const char* phase, uint64_t done, uint64_t total) {
   {
-    absl::MutexLock lock(&mu_);
+    MutexLock lock(&mu_);
     if (writing_ || phase_ == Phase::kFinishing) return;
     writing_ = true;
     v1::ImportProgress* progress = progress_.mutable_progress();
@@ -117,7 +117,7 @@ void ImportReactor::WriteProgress(const char* phase, uint64_t done, uint64_t tot
 
 void ImportReactor::EndWith(const absl::Status& status) {
   {
-    absl::MutexLock lock(&mu_);
+    MutexLock lock(&mu_);
     phase_ = Phase::kFinishing;
     end_ = status;
     if (writing_) return;  // OnWriteDone comes back here

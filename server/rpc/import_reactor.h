@@ -8,11 +8,11 @@
 #include "absl/base/thread_annotations.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
-#include "absl/synchronization/mutex.h"
 #include "dynmesh/v1/sessions.pb.h"
 #include "grpcpp/support/server_callback.h"
 #include "server/rpc/service_context.h"
 #include "server/session/importer/importer.h"
+#include "server/session/mutex.h"
 
 namespace dynmesh {
 
@@ -60,7 +60,7 @@ class ImportReactor final : public grpc::ServerBidiReactor<v1::ImportMeshRequest
   v1::ImportMeshResponse progress_;
   v1::ImportMeshResponse result_;
 
-  absl::Mutex mu_;
+  Mutex mu_;
   Phase phase_ ABSL_GUARDED_BY(mu_) = Phase::kReceiving;
   bool writing_ ABSL_GUARDED_BY(mu_) = false;
   absl::Status end_ ABSL_GUARDED_BY(mu_);

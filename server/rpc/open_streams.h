@@ -3,7 +3,7 @@
 
 #include "absl/base/thread_annotations.h"
 #include "absl/container/flat_hash_set.h"
-#include "absl/synchronization/mutex.h"
+#include "server/session/mutex.h"
 
 namespace dynmesh {
 
@@ -20,7 +20,7 @@ class OpenStreams {
  public:
   /// False when the server is shutting down already; the stream is not added then.
   bool Add(Drainable* stream) {
-    absl::MutexLock lock(&mu_);
+    MutexLock lock(&mu_);
     if (draining_) return false;
     streams_.insert(stream);
     return true;
@@ -28,18 +28,18 @@ class OpenStreams {
 
   /// Afterwards OnDrain() is not called any more. A stream that was not added is ignored.
   void Remove(Drainable* stream) {
-    absl::MutexLock lock(&mu_);
+    MutexLock lock(&mu_);
     streams_.erase(stream);
   }
 
   void Drain() {
-    absl::MutexLock lock(&mu_);
+    MutexLock lock(&mu_);
     draining_ = true;
     for (Drainable* stream : streams_) stream->OnDrain();
   }
 
  private:
-  absl::Mutex mu_;
+  Mutex mu_;
   absl::flat_hash_set<Drainable*> streams_ ABSL_GUARDED_BY(mu_);
   bool draining_ ABSL_GUARDED_BY(mu_) = false;
 };

@@ -123,7 +123,8 @@ class GetBoundarySurfaceReactor final : public ChunkStreamReactor<v1::GetBoundar
  private:
   absl::Status Gather() override {
     const int bits = request_.position_bits() == 0 ? kDefaultSurfaceBits : request_.position_bits();
-    if (bits < 1 || bits > kMaxPositionBits) return BadField("position_bits", "position_bits is outside 0-30");
+    if (bits < 1 || bits > kMaxPositionBits)
+      return BadField("position_bits", "position_bits is outside 0-30");
     DYNMESH_ASSIGN_OR_RETURN(const SessionPtr session, services_.registry.Find(request_.session()));
     DYNMESH_ASSIGN_OR_RETURN(answer_, QuerySurface(*session, bits));
     return absl::OkStatus();

@@ -42,7 +42,8 @@ absl::Status GetSession(const ServiceContext& services, const v1::GetSessionRequ
 absl::Status ListSessions(const ServiceContext& services, const v1::ListSessionsRequest& request,
                           v1::ListSessionsResponse* response) {
   if (request.page_size() < 0) return BadField("page_size", "page_size is negative");
-  const size_t size = request.page_size() == 0 ? kDefaultPageSize : std::min(request.page_size(), kMaxPageSize);
+  const size_t size =
+      request.page_size() == 0 ? kDefaultPageSize : std::min(request.page_size(), kMaxPageSize);
   DYNMESH_ASSIGN_OR_RETURN(const std::string after, FromPageToken(request.page_token()));
   const std::vector<SessionPtr> sessions = services.registry.ListAfter(after, size + 1);
   size_t bytes = 0;
@@ -146,8 +147,8 @@ class SessionsService final : public v1::SessionService::CallbackService {
     return (new ImportReactor(services_))->Start();
   }
 
-  grpc::ServerWriteReactor<v1::ExportMeshResponse>* ExportMesh(grpc::CallbackServerContext* context,
-                                                               const v1::ExportMeshRequest* request) override {
+  grpc::ServerWriteReactor<v1::ExportMeshResponse>* ExportMesh(
+      grpc::CallbackServerContext* context, const v1::ExportMeshRequest* request) override {
     return (new ExportMeshReactor(services_, context, request))->Start(services_.heavy());
   }
 

@@ -16,7 +16,8 @@ constexpr char kErrorInfoUrl[] = "type.googleapis.com/google.rpc.ErrorInfo";
 constexpr size_t kMaxMessageBytes = 1000;
 constexpr size_t kMaxValueBytes = 500;
 
-/// Printable ASCII of at most `max_bytes`: whatever a caller's text was cut to, it is valid in a proto string.
+/// Printable ASCII of at most `max_bytes`: whatever a caller's text was cut to, it is valid in a proto
+/// string.
 std::string Printable(absl::string_view text, size_t max_bytes) {
   std::string out(text.substr(0, max_bytes));
   std::replace_if(

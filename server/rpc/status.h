@@ -14,8 +14,8 @@ ErrorDetail DetailOf(const absl::Status& status);
 /// Message and metadata are shortened to what fits into a trailer.
 grpc::Status ToGrpcStatus(const absl::Status& status);
 
-/// The same, with a line in the log: errors of ours as ERROR, faults of the peer as WARN, what belongs to normal
-/// work (not found, aborted, cancelled) as DEBUG. `rpc` is the method's name.
+/// The same, with a line in the log: errors of ours as ERROR, faults of the peer as WARN, what belongs to
+/// normal work (not found, aborted, cancelled) as DEBUG. `rpc` is the method's name.
 grpc::Status LoggedStatus(const char* rpc, const absl::Status& status);
 
 }  // namespace dynmesh

@@ -1,22 +1,26 @@
 #ifndef DYNMESH_SERVER_RPC_STREAM_EDITS_REACTOR_H_
 #define DYNMESH_SERVER_RPC_STREAM_EDITS_REACTOR_H_
 
+#include <deque>
+
 #include "absl/base/thread_annotations.h"
 #include "absl/status/status.h"
-#include "absl/synchronization/mutex.h"
 #include "dynmesh/v1/edits.pb.h"
 #include "grpcpp/support/server_callback.h"
 #include "server/rpc/open_streams.h"
 #include "server/rpc/service_context.h"
+#include "server/session/mutex.h"
 
 namespace dynmesh {
 
-/// One StreamEdits call: batches are applied one after the other, each answered in order.
+/// One StreamEdits call: three stages that run at the same time, with a short queue between each two.
 ///
-///     read ──> apply (executor) ──> write the answer and read the next at once ──> both done: apply ...
+///     read ──> requests_ ──> apply (executor) ──> responses_ ──> write
 ///
-/// A refused batch is answered in band. The stream ends OK when the peer has half-closed and has all answers,
-/// and with UNAVAILABLE SHUTTING_DOWN, after the answer that is due, when the server drains. Deletes itself.
+/// Batches are applied and answered in order; a refused one is answered in band. A peer that does not read
+/// its answers is not read from either. The stream ends OK when the peer has half-closed and has all answers,
+/// and with UNAVAILABLE SHUTTING_DOWN, after the answers to what was read, when the server drains. Deletes
+/// itself.
 class StreamEditsReactor final
     : public grpc::ServerBidiReactor<v1::StreamEditsRequest, v1::StreamEditsResponse>,
       public Drainable {
@@ -31,27 +35,37 @@ class StreamEditsReactor final
   void OnDone() override;
 
  private:
-  enum class Action { kNone, kApply, kFinish };
+  enum class Action { kNone, kRead, kApply, kWrite, kFinish };
 
-  /// What to do after a change of state; called once for each, and the answer must be obeyed.
-  Action Next() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
+  /// Does what there is to do. One thread at a time is in here: who comes meanwhile leaves it to that thread.
+  void Pump() ABSL_LOCKS_EXCLUDED(mu_);
+  /// REQUIRES: pumping_ was set by this thread.
+  void PumpOn() ABSL_LOCKS_EXCLUDED(mu_);
+  /// The next thing to do, marked as begun.
+  Action Choose() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
+  bool IsOver() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
+  absl::Status EndStatus() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
   void Do(Action action) ABSL_LOCKS_EXCLUDED(mu_);
-  absl::Status EndStatus() const ABSL_SHARED_LOCKS_REQUIRED(mu_);
-  void Apply();
-  void Respond(const absl::Status& status);
+  void ApplyQueued();
+  bool TakeRequest(v1::StreamEditsRequest* request) ABSL_LOCKS_EXCLUDED(mu_);
+  void Answer(v1::StreamEditsResponse response) ABSL_LOCKS_EXCLUDED(mu_);
+  void StopApplying() ABSL_LOCKS_EXCLUDED(mu_);
 
   const ServiceContext services_;
-  v1::StreamEditsRequest request_;
-  v1::StreamEditsResponse response_;
+  v1::StreamEditsRequest reading_into_;
+  v1::StreamEditsResponse writing_from_;
 
-  absl::Mutex mu_;
+  Mutex mu_;
+  std::deque<v1::StreamEditsRequest> requests_ ABSL_GUARDED_BY(mu_);
+  std::deque<v1::StreamEditsResponse> responses_ ABSL_GUARDED_BY(mu_);
+  size_t request_bytes_ ABSL_GUARDED_BY(mu_) = 0;  ///< of requests_
+  bool pumping_ ABSL_GUARDED_BY(mu_) = false;      ///< for ever, once the call is finished
   bool reading_ ABSL_GUARDED_BY(mu_) = false;
   bool writing_ ABSL_GUARDED_BY(mu_) = false;
   bool applying_ ABSL_GUARDED_BY(mu_) = false;
-  bool closed_ ABSL_GUARDED_BY(mu_) = false;    ///< by the peer
-  bool broken_ ABSL_GUARDED_BY(mu_) = false;    ///< a write failed
+  bool closed_ ABSL_GUARDED_BY(mu_) = false;  ///< by the peer
+  bool broken_ ABSL_GUARDED_BY(mu_) = false;  ///< a write failed
   bool draining_ ABSL_GUARDED_BY(mu_) = false;
-  bool finished_ ABSL_GUARDED_BY(mu_) = false;
 };
 
 }  // namespace dynmesh

@@ -10,8 +10,8 @@
 
 namespace dynmesh {
 
-/// One Subscribe call: hands a follower's payloads to gRPC as bytes. The encoded delta is one block of memory,
-/// shared by all streams that send it; only the few bytes before it are made for each.
+/// One Subscribe call: hands a follower's payloads to gRPC as bytes. The encoded delta is one block of
+/// memory, shared by all streams that send it; only the few bytes before it are made for each.
 ///
 ///     Session <── Follower ──(DeltaSink)──> SubscribeReactor ──> gRPC
 ///

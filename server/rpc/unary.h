@@ -5,8 +5,8 @@
 
 #include "absl/status/status.h"
 #include "google/protobuf/message_lite.h"
-#include "grpcpp/support/server_callback.h"
 #include "grpcpp/server_context.h"
+#include "grpcpp/support/server_callback.h"
 #include "server/rpc/status.h"
 #include "server/session/catch_exceptions.h"
 #include "server/session/executor.h"

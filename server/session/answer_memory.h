@@ -17,7 +17,7 @@ namespace dynmesh {
 
 inline constexpr size_t kMaxRequestIdBytes = 128;
 inline constexpr size_t kRememberedAnswers = 4096;
-inline constexpr size_t kRememberedAnswerBytes = size_t{64} << 20;
+inline constexpr size_t kRememberedAnswerBytes = size_t{16} << 20;
 
 /// INVALID_ARGUMENT unless `id` has at most kMaxRequestIdBytes.
 inline absl::Status CheckRequestId(absl::string_view id) {

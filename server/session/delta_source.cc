@@ -1,7 +1,7 @@
 #include "server/session/delta_source.h"
 
 #include <algorithm>
-#include <cmath>
+#include <limits>
 #include <utility>
 
 #include "absl/time/time.h"
@@ -14,6 +14,7 @@ namespace {
 
 // No message may exceed 4 MiB, however wide the rows of the session's attributes are.
 constexpr size_t kPartBytes = size_t{3} << 20;
+constexpr double kLargestCoordinate = std::numeric_limits<double>::max() / 8;
 // Callbacks that are called one after the other, before another thread takes the next ones.
 constexpr size_t kDeliveryBatch = 64;
 
@@ -26,18 +27,19 @@ size_t PartItems(const Mesh& mesh) {
                          : std::min(DeltaSource::kPartItems, kPartBytes / widest_row);
 }
 
-/// `box` widened by an eighth of its longest side, as long as that is finite.
+/// `box` widened by an eighth of its longest side, and cut to where sizes of boxes are finite.
 Box Widen(Box box) {
   double longest = 0;
-  for (int axis = 0; axis < 3; ++axis) longest = std::max(longest, box.high[axis] - box.low[axis]);
-  const double margin = longest / 8;
-  Box wide = box;
   for (int axis = 0; axis < 3; ++axis) {
-    wide.low[axis] -= margin;
-    wide.high[axis] += margin;
-    if (!std::isfinite(wide.high[axis] - wide.low[axis])) return box;
+    box.low[axis] = std::max(box.low[axis], -kLargestCoordinate);
+    box.high[axis] = std::min(box.high[axis], kLargestCoordinate);
+    longest = std::max(longest, box.high[axis] - box.low[axis]);
   }
-  return wide;
+  for (int axis = 0; axis < 3; ++axis) {
+    box.low[axis] -= longest / 8;
+    box.high[axis] += longest / 8;
+  }
+  return box;
 }
 
 }  // namespace
@@ -45,7 +47,7 @@ Box Widen(Box box) {
 void DeltaSource::Get(const DeltaKey& key, Callback done) {
   PayloadPtr kept;
   {
-    absl::MutexLock lock(&mu_);
+    MutexLock lock(&mu_);
     kept = FindKept(key);
     if (kept == nullptr) {
       for (Pending& pending : pending_) {
@@ -73,7 +75,7 @@ PayloadPtr DeltaSource::FindKept(const DeltaKey& key) const {
 
 std::vector<DeltaSource::Callback> DeltaSource::Publish(const DeltaKey& key,
                                                         const absl::StatusOr<PayloadPtr>& payload) {
-  absl::MutexLock lock(&mu_);
+  MutexLock lock(&mu_);
   const auto pending =
       std::find_if(pending_.begin(), pending_.end(), [&](const Pending& entry) { return entry.key == key; });
   std::vector<Callback> waiting = std::move(pending->waiting);
@@ -95,7 +97,7 @@ void DeltaSource::Keep(const DeltaKey& key, PayloadPtr payload) {
 }
 
 void DeltaSource::Forget() {
-  absl::MutexLock lock(&mu_);
+  MutexLock lock(&mu_);
   kept_.clear();
 }
 
@@ -136,7 +138,7 @@ absl::StatusOr<PayloadPtr> DeltaSource::Make(const DeltaKey& key) {
 }
 
 QuantizationGrid DeltaSource::GridFor(int bits, const SessionView& view) {
-  absl::MutexLock lock(&grids_mu_);
+  MutexLock lock(&grids_mu_);
   const auto found = grids_.find(bits);
   if (found != grids_.end()) return found->second;
   const Box box = Widen(*BoundsOf(view.mesh));

@@ -13,10 +13,10 @@
 #include "absl/base/thread_annotations.h"
 #include "absl/functional/any_invocable.h"
 #include "absl/status/statusor.h"
-#include "absl/synchronization/mutex.h"
 #include "absl/types/optional.h"
 #include "core/codec/codec.h"
 #include "core/delta/diff.h"
+#include "server/session/mutex.h"
 
 namespace dynmesh {
 
@@ -26,11 +26,11 @@ struct SessionView;
 /// An encoded delta and what a follower needs to know of it. Shared by all followers that ask for the same.
 struct Payload {
   int64_t from_revision = 0;
-  int64_t revision = 0;      ///< of the session when it was made
-  bool consistent = true;    ///< false: one part of a longer answer
-  DiffCursor next;           ///< where the following part begins
+  int64_t revision = 0;    ///< of the session when it was made
+  bool consistent = true;  ///< false: one part of a longer answer
+  DiffCursor next;         ///< where the following part begins
   int64_t commit_time_us = 0;
-  std::string delta;         ///< core/codec/FORMAT.md
+  std::string delta;  ///< core/codec/FORMAT.md
   EncodeStats stats;
 };
 using PayloadPtr = std::shared_ptr<const Payload>;
@@ -38,16 +38,16 @@ using PayloadPtr = std::shared_ptr<const Payload>;
 /// Which delta a follower asks for.
 struct DeltaKey {
   int64_t from_revision = 0;
-  int64_t base_revision = 0;    ///< what the client has for certain: a closing delta starts later than that
-  int64_t at_least = 0;         ///< the payload's `revision` is this or later
-  int64_t walk_start = -1;      ///< -1: a new answer; else the revision of its first part
-  DiffCursor cursor;            ///< where in the walk
+  int64_t base_revision = 0;  ///< what the client has for certain: a closing delta starts later than that
+  int64_t at_least = 0;       ///< the payload's `revision` is this or later
+  int64_t walk_start = -1;    ///< -1: a new answer; else the revision of its first part
+  DiffCursor cursor;          ///< where in the walk
   Codec codec = Codec::kUnspecified;
   int position_bits = 0;
 
   auto AsTuple() const {
-    return std::make_tuple(from_revision, base_revision, at_least, walk_start, cursor.stage, cursor.column, cursor.next,
-                           static_cast<int>(codec), position_bits);
+    return std::make_tuple(from_revision, base_revision, at_least, walk_start, cursor.stage, cursor.column,
+                           cursor.next, static_cast<int>(codec), position_bits);
   }
   friend bool operator==(const DeltaKey& a, const DeltaKey& b) { return a.AsTuple() == b.AsTuple(); }
 };
@@ -56,8 +56,9 @@ struct DeltaKey {
 ///
 /// The first to ask for a key computes the difference under the session's reader lock and encodes it
 /// without; whoever asks meanwhile gets the same payload when it is ready, and whoever asks soon after finds
-/// it among the last few of that revision (kKeptPayloads, at most kKeptBytes). So a thousand followers at the same revision
-/// cost one encoding. A delta of more than kPartItems slots comes in parts, between which the lock is free.
+/// it among the last few of that revision (kKeptPayloads, at most kKeptBytes). So a thousand followers at the
+/// same revision cost one encoding. A delta of more than kPartItems slots comes in parts, between which the
+/// lock is free.
 ///
 /// Quantised positions lie on a grid for each number of bits, fixed when the first such delta with a vertex
 /// is made: the vertices' bounding cube then, widened by an eighth on each side.
@@ -101,10 +102,10 @@ class DeltaSource {
   QuantizationGrid GridFor(int bits, const SessionView& view);
 
   Session& session_;
-  absl::Mutex mu_;
+  Mutex mu_;
   std::vector<Pending> pending_ ABSL_GUARDED_BY(mu_);
   std::deque<Kept> kept_ ABSL_GUARDED_BY(mu_);
-  absl::Mutex grids_mu_;
+  Mutex grids_mu_;
   std::map<int, QuantizationGrid> grids_ ABSL_GUARDED_BY(grids_mu_);
   std::atomic<uint64_t> num_encodings_{0};
 };

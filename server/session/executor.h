@@ -10,7 +10,7 @@
 #include "absl/base/thread_annotations.h"
 #include "absl/functional/any_invocable.h"
 #include "absl/status/status.h"
-#include "absl/synchronization/mutex.h"
+#include "server/session/mutex.h"
 
 namespace dynmesh {
 
@@ -27,7 +27,7 @@ class Executor {
   using Task = absl::AnyInvocable<void()>;
 
   struct Options {
-    std::string name;        ///< for the log
+    std::string name;  ///< for the log
     int threads = 2;
     size_t max_queued = 10'000;
   };
@@ -48,10 +48,12 @@ class Executor {
 
  private:
   void Work();
-  bool HasWorkOrStops() const ABSL_SHARED_LOCKS_REQUIRED(mu_) { return stopping_ || !queue_.empty(); }
+  /// The next task; null when there is none and there will be none.
+  Task Take() ABSL_LOCKS_EXCLUDED(mu_);
 
   const Options options_;
-  absl::Mutex mu_;
+  Mutex mu_;
+  CondVar has_work_or_stops_;
   std::deque<Task> queue_ ABSL_GUARDED_BY(mu_);
   bool stopping_ ABSL_GUARDED_BY(mu_) = false;
   std::vector<std::thread> threads_;

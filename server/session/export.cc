@@ -35,7 +35,8 @@ class Exporter {
   absl::Status Vertices() {
     chunk_bytes_ = 0;
     return ForEachSelected(mesh_, EntityKind::kVertex, {}, [this](Slot slot) -> absl::Status {
-      DYNMESH_ASSIGN_OR_RETURN(ExportedVertices * chunk, Room(sizeof(Slot) + sizeof(Point), ExportedVertices()));
+      DYNMESH_ASSIGN_OR_RETURN(ExportedVertices * chunk,
+                               Room(sizeof(Slot) + sizeof(Point), ExportedVertices()));
       chunk->ids.push_back(slot);
       chunk->positions.push_back(mesh_.Position(VertexId(slot)));
       return absl::OkStatus();

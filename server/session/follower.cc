@@ -27,17 +27,21 @@ absl::Status CheckOptions(const FollowOptions& options, int64_t revision) {
 }  // namespace
 
 Follower::Follower(SessionPtr session, const FollowOptions& options, DeltaSink* sink)
-    : options_(options), sink_(sink), session_(std::move(session)), base_(options.from_revision), from_(base_) {}
+    : options_(options),
+      sink_(sink),
+      session_(std::move(session)),
+      base_(options.from_revision),
+      from_(base_) {}
 
 absl::Status Follower::Begin() {
   SessionPtr session;
   {
-    absl::MutexLock lock(&mu_);
+    MutexLock lock(&mu_);
     session = session_;
   }
   absl::Status begun = CheckOptions(options_, session->revision());
   if (begun.ok()) begun = session->followers().Add(shared_from_this());
-  absl::MutexLock lock(&mu_);
+  MutexLock lock(&mu_);
   if (begun.ok()) {
     PostStep();
   } else {
@@ -50,7 +54,7 @@ absl::Status Follower::Begin() {
 void Follower::OnSent(bool ok) {
   bool over = false;
   {
-    absl::MutexLock lock(&mu_);
+    MutexLock lock(&mu_);
     const PayloadPtr sent = std::move(sending_);
     if (!ok) RequestEnd(CallCancelled());
     over = TakeEnd();
@@ -63,14 +67,15 @@ void Follower::OnSent(bool ok) {
 }
 
 void Follower::Wake() {
-  absl::MutexLock lock(&mu_);
-  if (state_ == State::kIdle) PostStep();
+  MutexLock lock(&mu_);
+  // It may have seen the revision by itself, on its way to rest.
+  if (state_ == State::kIdle && HasMore()) PostStep();
 }
 
 void Follower::End(const absl::Status& status) {
   bool over = false;
   {
-    absl::MutexLock lock(&mu_);
+    MutexLock lock(&mu_);
     RequestEnd(status);
     if (state_ == State::kIdle || state_ == State::kPausing) over = TakeEnd();
   }
@@ -82,7 +87,7 @@ void Follower::Step() {
   DeltaKey key;
   SessionPtr session;
   {
-    absl::MutexLock lock(&mu_);
+    MutexLock lock(&mu_);
     over = TakeEnd();
     if (!over) {
       key = NextKey();
@@ -98,7 +103,7 @@ void Follower::Step() {
 void Follower::OnPayload(const absl::StatusOr<PayloadPtr>& payload) {
   bool over = false;
   {
-    absl::MutexLock lock(&mu_);
+    MutexLock lock(&mu_);
     if (!payload.ok()) RequestEnd(payload.status());
     over = TakeEnd();
     if (!over) {
@@ -111,7 +116,7 @@ void Follower::OnPayload(const absl::StatusOr<PayloadPtr>& payload) {
 }
 
 void Follower::OnPauseOver() {
-  absl::MutexLock lock(&mu_);
+  MutexLock lock(&mu_);
   if (state_ == State::kPausing) PostStep();
 }
 
@@ -141,7 +146,7 @@ void Follower::Finish() {
   SessionPtr session;
   absl::Status status;
   {
-    absl::MutexLock lock(&mu_);
+    MutexLock lock(&mu_);
     session = std::move(session_);
     status = end_;
   }

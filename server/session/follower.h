@@ -7,10 +7,10 @@
 #include "absl/base/thread_annotations.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
-#include "absl/synchronization/mutex.h"
 #include "absl/time/time.h"
 #include "absl/types/optional.h"
 #include "server/session/delta_source.h"
+#include "server/session/mutex.h"
 #include "server/session/session.h"
 
 namespace dynmesh {
@@ -32,20 +32,19 @@ class DeltaSink {
 struct FollowOptions {
   int64_t from_revision = 0;
   Codec codec = Codec::kUnspecified;
-  int position_bits = 0;                     ///< 0: lossless
+  int position_bits = 0;                               ///< 0: lossless
   absl::Duration min_interval = absl::ZeroDuration();  ///< at least this long between consistent deltas
 };
 
 /// One who follows a session: a revision, and at most one payload in flight. Nothing is queued.
 ///
-///            Begin                  newer revision                        payload
-///     ────> kStepping <─────────── kIdle <──┐                 kStepping ────────> kSending
-///                                           │ nothing newer       ^                   │ OnSent
-///                                           ├─────────────────────┼───────────────────┤
-///                                           └── kPausing <────────┘ more to send      │
-///                                                 ^  min_interval not over            │
-///                                                 └───────────────────────────────────┘
-///     End(), in any state: kEnded at once, or as soon as the step or the sending is over.
+///     kStepping  a step is posted or runs, or waits for a payload that another follower makes
+///     kSending   the sink has a payload; OnSent() goes on from here
+///     kIdle      the client has everything; Wake() makes a step
+///     kPausing   there is something new, but min_interval is not over; the timer makes a step
+///     kEnded     the sink has been told
+///
+/// End() ends an idle or pausing follower at once, and others as soon as their step or sending is over.
 ///
 /// The first delta that is consistent is sent even when it is empty: so the client learns where it stands.
 /// Thread safety: full. Owned by the session's FollowerList and by its own tasks.
@@ -90,15 +89,16 @@ class Follower : public std::enable_shared_from_this<Follower> {
   const FollowOptions options_;
   DeltaSink* const sink_;
 
-  absl::Mutex mu_;
+  Mutex mu_;
   SessionPtr session_ ABSL_GUARDED_BY(mu_);  ///< null once ended: a follower keeps no deleted session alive
   State state_ ABSL_GUARDED_BY(mu_) = State::kStepping;
-  absl::Status end_ ABSL_GUARDED_BY(mu_);    ///< what to end with
+  absl::Status end_ ABSL_GUARDED_BY(mu_);  ///< what to end with
   bool ending_ ABSL_GUARDED_BY(mu_) = false;
   PayloadPtr sending_ ABSL_GUARDED_BY(mu_);
 
   int64_t base_ ABSL_GUARDED_BY(mu_);  ///< what the client has for certain: the last consistent revision
-  int64_t from_ ABSL_GUARDED_BY(mu_);  ///< what the next difference starts from; later than base_ when closing
+  int64_t from_
+      ABSL_GUARDED_BY(mu_);  ///< what the next difference starts from; later than base_ when closing
   bool owes_delta_ ABSL_GUARDED_BY(mu_) = true;  ///< a consistent one, even if empty
   int64_t walk_start_ ABSL_GUARDED_BY(mu_) = kNoWalk;
   DiffCursor cursor_ ABSL_GUARDED_BY(mu_);

@@ -8,7 +8,7 @@
 namespace dynmesh {
 
 absl::Status FollowerList::Add(std::shared_ptr<Follower> follower) {
-  absl::MutexLock lock(&mu_);
+  MutexLock lock(&mu_);
   DYNMESH_RETURN_IF_ERROR(closed_);
   if (followers_.size() >= max_followers_) {
     return LimitExceeded("max_followers", max_followers_, followers_.size() + 1);
@@ -18,19 +18,19 @@ absl::Status FollowerList::Add(std::shared_ptr<Follower> follower) {
 }
 
 void FollowerList::Remove(const std::shared_ptr<Follower>& follower) {
-  absl::MutexLock lock(&mu_);
+  MutexLock lock(&mu_);
   followers_.erase(follower);
 }
 
 void FollowerList::Wake() {
-  absl::MutexLock lock(&mu_);
+  MutexLock lock(&mu_);
   for (const std::shared_ptr<Follower>& follower : followers_) follower->Wake();
 }
 
 void FollowerList::Close(const absl::Status& status) {
   absl::flat_hash_set<std::shared_ptr<Follower>> followers;
   {
-    absl::MutexLock lock(&mu_);
+    MutexLock lock(&mu_);
     if (!closed_.ok()) return;
     closed_ = status;
     followers.swap(followers_);
@@ -40,7 +40,7 @@ void FollowerList::Close(const absl::Status& status) {
 }
 
 uint32_t FollowerList::size() const {
-  absl::MutexLock lock(&mu_);
+  MutexLock lock(&mu_);
   return followers_.size();
 }
 

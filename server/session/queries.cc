@@ -47,7 +47,8 @@ class NeighborsBuilder {
     first_offset_ = first_offset;
   }
 
-  /// Puts all but the last piece of a long row into chunks without ids; returns how many neighbours these took.
+  /// Puts all but the last piece of a long row into chunks without ids; returns how many neighbours these
+  /// took.
   size_t CutLongRow() {
     const size_t cut = (row_.size() - 1) / kPieceIds * kPieceIds;
     for (size_t begin = 0; begin < cut; begin += kPieceIds) {
@@ -122,8 +123,8 @@ class EntitiesBuilder {
   std::vector<EntitiesChunk> chunks_;
 };
 
-absl::StatusOr<NeighborsAnswer> GatherNeighbors(const Mesh& mesh, Relation relation, const Selection& selection,
-                                                uint64_t max_bytes) {
+absl::StatusOr<NeighborsAnswer> GatherNeighbors(const Mesh& mesh, Relation relation,
+                                                const Selection& selection, uint64_t max_bytes) {
   NeighborsBuilder builder(mesh, relation, max_bytes);
   DYNMESH_RETURN_IF_ERROR(
       ForEachSelected(mesh, relation.from, selection, [&](Slot slot) { return builder.AddRow(slot); }));
@@ -133,7 +134,8 @@ absl::StatusOr<NeighborsAnswer> GatherNeighbors(const Mesh& mesh, Relation relat
 absl::StatusOr<EntitiesAnswer> GatherEntities(const Mesh& mesh, EntityKind kind, const Selection& selection,
                                               uint64_t max_bytes) {
   EntitiesBuilder builder(mesh, kind, max_bytes);
-  DYNMESH_RETURN_IF_ERROR(ForEachSelected(mesh, kind, selection, [&](Slot slot) { return builder.Add(slot); }));
+  DYNMESH_RETURN_IF_ERROR(
+      ForEachSelected(mesh, kind, selection, [&](Slot slot) { return builder.Add(slot); }));
   return EntitiesAnswer{mesh.revision(), std::move(builder).Take()};
 }
 

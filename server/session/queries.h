@@ -15,8 +15,8 @@
 /// There is always a first chunk, even without rows.
 namespace dynmesh {
 
-/// Rows of neighbours: row i has offsets[i + 1] - offsets[i] of them. A row longer than half a chunk is cut: it
-/// begins in chunks without ids, and the offsets of the chunk with its id count from there.
+/// Rows of neighbours: row i has offsets[i + 1] - offsets[i] of them. A row longer than half a chunk is cut:
+/// it begins in chunks without ids, and the offsets of the chunk with its id count from there.
 struct NeighborsChunk {
   std::vector<Slot> ids;
   std::vector<uint32_t> offsets = {0};
@@ -27,8 +27,8 @@ struct NeighborsAnswer {
   std::vector<NeighborsChunk> chunks;
 };
 
-/// Errors: NOT_FOUND ENTITY_REMOVED or UNKNOWN_ENTITY (metadata ids: the first that are not live); OUT_OF_RANGE
-/// REVISION_IN_FUTURE; RESOURCE_EXHAUSTED LIMIT_EXCEEDED (max_query_bytes).
+/// Errors: NOT_FOUND ENTITY_REMOVED or UNKNOWN_ENTITY (metadata ids: the first that are not live);
+/// OUT_OF_RANGE REVISION_IN_FUTURE; RESOURCE_EXHAUSTED LIMIT_EXCEEDED (max_query_bytes).
 absl::StatusOr<NeighborsAnswer> QueryNeighbors(const Session& session, Relation relation,
                                                const Selection& selection);
 
@@ -36,10 +36,10 @@ enum EntityFlags : uint8_t { kIsElement = 1, kIsOnBoundary = 2, kIsDuplicate = 4
 
 struct EntitiesChunk {
   std::vector<Slot> ids;
-  std::vector<Point> positions;           ///< vertices only
-  std::vector<ElementType> types;         ///< all but vertices
-  std::vector<uint32_t> vertex_offsets;   ///< all but vertices
-  std::vector<VertexId> vertices;         ///< all but vertices
+  std::vector<Point> positions;          ///< vertices only
+  std::vector<ElementType> types;        ///< all but vertices
+  std::vector<uint32_t> vertex_offsets;  ///< all but vertices
+  std::vector<VertexId> vertices;        ///< all but vertices
   std::vector<uint8_t> flags;
   std::vector<int64_t> born_revisions;
 };

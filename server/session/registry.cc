@@ -27,7 +27,7 @@ absl::StatusOr<SessionInfo> SessionRegistry::Create(const std::string& name, con
   DYNMESH_RETURN_IF_ERROR(CheckSessionName(name));
   DYNMESH_RETURN_IF_ERROR(CheckRequestId(request_id));
   const uint64_t fingerprint = FingerprintOf(name, settings);
-  absl::MutexLock lock(&mu_);
+  MutexLock lock(&mu_);
   if (!request_id.empty()) {
     DYNMESH_ASSIGN_OR_RETURN(const auto remembered, created_.Find(request_id, fingerprint));
     if (remembered != nullptr) return *remembered;
@@ -55,7 +55,7 @@ absl::StatusOr<SessionPtr> SessionRegistry::Insert(const std::string& name, cons
 
 absl::StatusOr<SessionPtr> SessionRegistry::Find(absl::string_view name) const {
   DYNMESH_RETURN_IF_ERROR(CheckSessionName(name));
-  absl::MutexLock lock(&mu_);
+  MutexLock lock(&mu_);
   const auto found = sessions_.find(Key(name));
   if (found == sessions_.end()) return SessionNotFound(name);
   return found->second;
@@ -63,8 +63,9 @@ absl::StatusOr<SessionPtr> SessionRegistry::Find(absl::string_view name) const {
 
 std::vector<SessionPtr> SessionRegistry::ListAfter(absl::string_view after, size_t max_sessions) const {
   std::vector<SessionPtr> page;
-  absl::MutexLock lock(&mu_);
-  for (auto it = sessions_.upper_bound(Key(after)); it != sessions_.end() && page.size() < max_sessions; ++it) {
+  MutexLock lock(&mu_);
+  for (auto it = sessions_.upper_bound(Key(after)); it != sessions_.end() && page.size() < max_sessions;
+       ++it) {
     page.push_back(it->second);
   }
   return page;
@@ -73,16 +74,17 @@ std::vector<SessionPtr> SessionRegistry::ListAfter(absl::string_view after, size
 absl::StatusOr<int64_t> SessionRegistry::Delete(absl::string_view name, absl::string_view etag) {
   DYNMESH_ASSIGN_OR_RETURN(const SessionPtr session, Find(name));
   DYNMESH_ASSIGN_OR_RETURN(const int64_t revision, session->Delete(etag));
-  absl::MutexLock lock(&mu_);
+  MutexLock lock(&mu_);
   sessions_.erase(session->name());
-  spdlog::info("session_deleted name={} revision={} sessions={}", session->name(), revision, sessions_.size());
+  spdlog::info("session_deleted name={} revision={} sessions={}", session->name(), revision,
+               sessions_.size());
   return revision;
 }
 
 void SessionRegistry::Drain() {
   std::vector<SessionPtr> sessions;
   {
-    absl::MutexLock lock(&mu_);
+    MutexLock lock(&mu_);
     draining_ = true;
     for (const auto& [name, session] : sessions_) sessions.push_back(session);
   }

@@ -10,10 +10,10 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
-#include "absl/synchronization/mutex.h"
 #include "server/session/answer_memory.h"
 #include "server/session/importer/importer.h"
 #include "server/session/limits.h"
+#include "server/session/mutex.h"
 #include "server/session/session.h"
 #include "server/session/workers.h"
 
@@ -57,7 +57,7 @@ class SessionRegistry {
   const Limits limits_;
   const Workers workers_;
   ImportGate import_gate_;
-  mutable absl::Mutex mu_;
+  mutable Mutex mu_;
   std::map<std::string, SessionPtr, std::less<>> sessions_ ABSL_GUARDED_BY(mu_);
   AnswerMemory<SessionInfo> created_ ABSL_GUARDED_BY(mu_);
   bool draining_ ABSL_GUARDED_BY(mu_) = false;

@@ -22,7 +22,8 @@ absl::Status CheckAllLive(const Mesh& mesh, EntityKind kind, const std::vector<S
     if (missing.size() > kMaxNamedIds) break;
   }
   if (missing.size() <= 1) return first;
-  return MakeError(first.code(), ErrorReason(first), absl::StrCat(first.message(), ", and it is not the only one"),
+  return MakeError(first.code(), ErrorReason(first),
+                   absl::StrCat(first.message(), ", and it is not the only one"),
                    {{"kind", std::string(EntityKindName(kind))}, {"ids", JoinSlots(missing)}});
 }
 

@@ -84,22 +84,24 @@ Session::Session(const Options& options)
       deltas_(*this) {}
 
 absl::Status Session::Read(absl::FunctionRef<absl::Status(const SessionView&)> fn) const {
-  absl::ReaderMutexLock lock(&mu_);
+  ReaderMutexLock lock(&mu_);
   DYNMESH_RETURN_IF_ERROR(gone_);
   return fn(SessionView{mesh_, commit_time_});
 }
 
 absl::StatusOr<SessionInfo> Session::Info() const {
-  SessionInfo info;
-  DYNMESH_RETURN_IF_ERROR(Read([&](const SessionView& view) {
-    info = DescribeMesh(view.mesh, summary_.Of(view.mesh));
-    info.update_time = view.commit_time;
-    return absl::OkStatus();
-  }));
+  return ReadAs<SessionInfo>([this](const SessionView& view) {
+    return Describe(view.mesh, summary_.Of(view.mesh), view.commit_time);
+  });
+}
+
+SessionInfo Session::Describe(const Mesh& mesh, const MeshSummary& summary, absl::Time update_time) const {
+  SessionInfo info = DescribeMesh(mesh, summary);
   info.name = name();
   info.settings = settings();
   info.etag = EtagAt(info.revision);
   info.create_time = create_time_;
+  info.update_time = update_time;
   info.followers = followers_.size();
   return info;
 }
@@ -112,7 +114,7 @@ absl::StatusOr<Session::AnswerPtr> Session::Apply(absl::Span<const Edit> edits, 
   const int64_t revision_before = revision();
   absl::StatusOr<AnswerPtr> answer;
   {
-    absl::WriterMutexLock lock(&mu_);
+    WriterMutexLock lock(&mu_);
     DYNMESH_RETURN_IF_ERROR(gone_);
     answer = once ? ApplyOnce(edits, options, fingerprint) : ApplyLocked(edits, options);
   }
@@ -187,7 +189,7 @@ void Session::Committed() {
 }
 
 absl::Status Session::CheckEmpty() const {
-  absl::ReaderMutexLock lock(&mu_);
+  ReaderMutexLock lock(&mu_);
   return CheckEmptyLocked();
 }
 
@@ -198,7 +200,7 @@ absl::Status Session::CheckEmptyLocked() const {
 
 absl::Status Session::Adopt(Mesh& mesh) {
   {
-    absl::WriterMutexLock lock(&mu_);
+    WriterMutexLock lock(&mu_);
     DYNMESH_RETURN_IF_ERROR(CheckEmptyLocked());
     std::swap(mesh_, mesh);
     Committed();
@@ -209,20 +211,20 @@ absl::Status Session::Adopt(Mesh& mesh) {
 
 absl::StatusOr<std::shared_ptr<const ImportOutcome>> Session::FindImport(absl::string_view request_id,
                                                                          uint64_t fingerprint) const {
-  absl::ReaderMutexLock lock(&mu_);
+  ReaderMutexLock lock(&mu_);
   DYNMESH_RETURN_IF_ERROR(gone_);
   return imports_.Find(request_id, fingerprint);
 }
 
 void Session::RememberImport(const std::string& request_id, uint64_t fingerprint,
                              std::shared_ptr<const ImportOutcome> outcome) {
-  absl::WriterMutexLock lock(&mu_);
+  WriterMutexLock lock(&mu_);
   imports_.Remember(request_id, fingerprint, std::move(outcome), 0);
 }
 
 absl::StatusOr<int64_t> Session::Delete(absl::string_view etag) {
   {
-    absl::WriterMutexLock lock(&mu_);
+    WriterMutexLock lock(&mu_);
     if (absl::IsNotFound(gone_)) return gone_;
     const std::string present = EtagAt(mesh_.revision());
     if (!etag.empty() && etag != present) return EtagMismatch(name(), present);

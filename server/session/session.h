@@ -11,7 +11,6 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
-#include "absl/synchronization/mutex.h"
 #include "absl/time/time.h"
 #include "absl/types/optional.h"
 #include "absl/types/span.h"
@@ -21,6 +20,7 @@
 #include "server/session/delta_source.h"
 #include "server/session/follower_list.h"
 #include "server/session/limits.h"
+#include "server/session/mutex.h"
 #include "server/session/session_info.h"
 #include "server/session/workers.h"
 
@@ -43,7 +43,8 @@ struct SessionView {
 /// What an import gave, and what a retry of it gets again.
 struct ImportOutcome;
 
-/// INVALID_ARGUMENT BAD_SESSION_NAME unless `name` is 1-64 of [A-Za-z0-9_.-] and starts with a letter or digit.
+/// INVALID_ARGUMENT BAD_SESSION_NAME unless `name` is 1-64 of [A-Za-z0-9_.-] and starts with a letter or
+/// digit.
 absl::Status CheckSessionName(absl::string_view name);
 
 /// A named mesh with its revision, its lock and its followers.
@@ -93,6 +94,9 @@ class Session {
 
   absl::StatusOr<SessionInfo> Info() const ABSL_LOCKS_EXCLUDED(mu_);
 
+  /// What Info() says when `mesh` is the content.
+  SessionInfo Describe(const Mesh& mesh, const MeshSummary& summary, absl::Time update_time) const;
+
   /// Applies a batch as one revision, all or nothing. Without edits it answers with the current state.
   /// Errors: those of ApplyBatch; ABORTED REVISION_MISMATCH (metadata expected, actual); OUT_OF_RANGE
   /// REVISION_IN_FUTURE; INVALID_ARGUMENT REQUEST_ID_REUSED; RESOURCE_EXHAUSTED. Nothing changed then.
@@ -100,7 +104,8 @@ class Session {
                                                            const ApplyOptions& options)
       ABSL_LOCKS_EXCLUDED(mu_);
 
-  /// What the import `request_id` gave, nullptr if there was none. Errors: INVALID_ARGUMENT REQUEST_ID_REUSED.
+  /// What the import `request_id` gave, nullptr if there was none. Errors: INVALID_ARGUMENT
+  /// REQUEST_ID_REUSED.
   absl::StatusOr<std::shared_ptr<const ImportOutcome>> FindImport(absl::string_view request_id,
                                                                   uint64_t fingerprint) const
       ABSL_LOCKS_EXCLUDED(mu_);
@@ -139,7 +144,7 @@ class Session {
   const uint64_t creation_id_;  ///< tells this session from an earlier one of the same name
   const absl::Time create_time_;
 
-  mutable absl::Mutex mu_;
+  mutable SharedMutex mu_;
   Mesh mesh_ ABSL_GUARDED_BY(mu_);
   absl::Time commit_time_ ABSL_GUARDED_BY(mu_);
   absl::Status gone_ ABSL_GUARDED_BY(mu_);  ///< not OK: deleted, or damaged by a failure half way

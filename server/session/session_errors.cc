@@ -8,8 +8,8 @@
 namespace dynmesh {
 
 absl::Status OutOfMemory() {
-  return MakeError(absl::StatusCode::kResourceExhausted, reason::kLimitExceeded, "the server is out of memory",
-                   {{"limit", "memory"}});
+  return MakeError(absl::StatusCode::kResourceExhausted, reason::kLimitExceeded,
+                   "the server is out of memory", {{"limit", "memory"}});
 }
 
 absl::Status ShuttingDown() {

@@ -42,7 +42,7 @@ absl::optional<Box> BoundsOf(const Mesh& mesh) {
 }
 
 MeshSummary SummaryCache::Of(const Mesh& mesh) {
-  absl::MutexLock lock(&mu_);
+  MutexLock lock(&mu_);
   if (revision_ != mesh.revision()) {
     summary_ = Summarize(mesh);
     revision_ = mesh.revision();

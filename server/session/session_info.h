@@ -7,11 +7,11 @@
 #include <vector>
 
 #include "absl/base/thread_annotations.h"
-#include "absl/synchronization/mutex.h"
 #include "absl/time/time.h"
 #include "absl/types/optional.h"
 #include "core/mesh/estimate.h"
 #include "core/mesh/mesh.h"
+#include "server/session/mutex.h"
 
 namespace dynmesh {
 
@@ -67,7 +67,7 @@ class SummaryCache {
   MeshSummary Of(const Mesh& mesh);
 
  private:
-  absl::Mutex mu_;
+  Mutex mu_;
   int64_t revision_ ABSL_GUARDED_BY(mu_) = -1;
   MeshSummary summary_ ABSL_GUARDED_BY(mu_);
 };

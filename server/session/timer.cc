@@ -7,26 +7,29 @@
 namespace dynmesh {
 
 void Timer::RunAt(absl::Time when, Task task) {
-  absl::MutexLock lock(&mu_);
-  if (!stopping_) tasks_.emplace(when, std::move(task));
+  MutexLock lock(&mu_);
+  if (stopping_) return;
+  tasks_.emplace(when, std::move(task));
+  news_.NotifyOne();
 }
 
 void Timer::Stop() {
   std::multimap<absl::Time, Task> dropped;  // destroyed without the lock: a task may own much
   {
-    absl::MutexLock lock(&mu_);
+    MutexLock lock(&mu_);
     stopping_ = true;
     dropped.swap(tasks_);
+    news_.NotifyOne();
   }
   if (thread_.joinable()) thread_.join();
 }
 
 void Timer::Run() {
-  absl::MutexLock lock(&mu_);
+  MutexLock lock(&mu_);
   while (!stopping_) {
-    next_ = tasks_.empty() ? absl::InfiniteFuture() : tasks_.begin()->first;
-    if (next_ > absl::Now()) {
-      mu_.AwaitWithDeadline(absl::Condition(this, &Timer::HasNews), next_);
+    const absl::Time next = tasks_.empty() ? absl::InfiniteFuture() : tasks_.begin()->first;
+    if (next > absl::Now()) {
+      news_.WaitUntil(&mu_, next);
       continue;
     }
     Task task = std::move(tasks_.begin()->second);

@@ -6,8 +6,8 @@
 
 #include "absl/base/thread_annotations.h"
 #include "absl/functional/any_invocable.h"
-#include "absl/synchronization/mutex.h"
 #include "absl/time/time.h"
+#include "server/session/mutex.h"
 
 namespace dynmesh {
 
@@ -33,14 +33,10 @@ class Timer {
 
  private:
   void Run();
-  /// Whether the thread has a reason to look again, `next_` being what it waits for.
-  bool HasNews() const ABSL_SHARED_LOCKS_REQUIRED(mu_) {
-    return stopping_ || (!tasks_.empty() && tasks_.begin()->first < next_);
-  }
 
-  absl::Mutex mu_;
+  Mutex mu_;
+  CondVar news_;  ///< a task that may be the first, or the end
   std::multimap<absl::Time, Task> tasks_ ABSL_GUARDED_BY(mu_);
-  absl::Time next_ ABSL_GUARDED_BY(mu_) = absl::InfiniteFuture();
   bool stopping_ ABSL_GUARDED_BY(mu_) = false;
   std::thread thread_;
 };

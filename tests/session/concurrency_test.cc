@@ -91,10 +91,12 @@ TEST(ConcurrencyTest, ReadersSeeWholeRevisionsAndFollowersStayEqual) {
   readers.emplace_back([&] {
     while (!stop) {
       ASSERT_TRUE(QueryNeighbors(*session, {EntityKind::kVertex, EntityKind::kCell}, {}).ok());
-      ASSERT_TRUE(session->Read([](const SessionView& view) {
-        EXPECT_THAT(Validate(view.mesh), ::testing::IsEmpty());
-        return absl::OkStatus();
-      }).ok());
+      ASSERT_TRUE(session
+                      ->Read([](const SessionView& view) {
+                        EXPECT_THAT(Validate(view.mesh), ::testing::IsEmpty());
+                        return absl::OkStatus();
+                      })
+                      .ok());
     }
   });
   for (std::thread& editor : editors) editor.join();

@@ -3,9 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <semaphore>
 #include <stdexcept>
 
-#include "absl/synchronization/notification.h"
 #include "absl/time/clock.h"
 #include "server/session/timer.h"
 #include "tests/session/session_support.h"
@@ -23,13 +23,15 @@ TEST(ExecutorTest, RunsWhatWaitsBeforeItStops) {
 }
 
 TEST(ExecutorTest, RefusesBeyondTheLimitAndNamesIt) {
-  absl::Notification go, begun;
+  std::binary_semaphore go{0}, begun{0};
   Executor executor({"test", 1, 2});
-  ASSERT_TRUE(executor.TryPost([&] {
-                        begun.Notify();
-                        go.WaitForNotification();
-                      }).ok());
-  begun.WaitForNotification();
+  ASSERT_TRUE(executor
+                  .TryPost([&] {
+                    begun.release();
+                    go.acquire();
+                  })
+                  .ok());
+  begun.acquire();
   EXPECT_TRUE(executor.TryPost([] {}).ok());
   EXPECT_TRUE(executor.TryPost([] {}).ok());
   const absl::Status refused = executor.TryPost([] {});
@@ -37,7 +39,7 @@ TEST(ExecutorTest, RefusesBeyondTheLimitAndNamesIt) {
   EXPECT_EQ(MetadataOf(refused, "limit"), "max_queued_tasks");
   bool ran = false;
   executor.Post([&] { ran = true; });  // what was admitted goes on
-  go.Notify();
+  go.release();
   executor.Stop();
   EXPECT_TRUE(ran);
 }
@@ -45,7 +47,8 @@ TEST(ExecutorTest, RefusesBeyondTheLimitAndNamesIt) {
 TEST(ExecutorTest, RefusesAfterStop) {
   Executor executor({"test", 1, 2});
   executor.Stop();
-  EXPECT_EQ(RefusalOf(executor.TryPost([] {})), (Refusal{absl::StatusCode::kUnavailable, reason::kShuttingDown}));
+  EXPECT_EQ(RefusalOf(executor.TryPost([] {})),
+            (Refusal{absl::StatusCode::kUnavailable, reason::kShuttingDown}));
 }
 
 TEST(ExecutorTest, SurvivesExceptions) {
@@ -60,23 +63,24 @@ TEST(ExecutorTest, SurvivesExceptions) {
 
 TEST(TimerTest, CallsInOrderOfTimeAndNotBefore) {
   Timer timer;
-  absl::Mutex mu;
+  Mutex mu;
+  CondVar changed;
   std::vector<int> order;
   const absl::Time begin = absl::Now();
   const auto later = [&](int ms, int id) {
     timer.RunAt(begin + absl::Milliseconds(ms), [&, ms, id] {
       EXPECT_GE(absl::Now(), begin + absl::Milliseconds(ms));
-      absl::MutexLock lock(&mu);
+      MutexLock lock(&mu);
       order.push_back(id);
+      changed.NotifyAll();
     });
   };
   later(60, 3);
   later(20, 1);
   later(40, 2);
   later(-5, 0);
-  absl::MutexLock lock(&mu);
-  const auto complete = [&] { return order.size() == 4; };
-  ASSERT_TRUE(mu.AwaitWithTimeout(absl::Condition(&complete), kPatience));
+  MutexLock lock(&mu);
+  ASSERT_TRUE(AwaitThat(&mu, changed, [&] { return order.size() == 4; }));
   EXPECT_EQ(order, (std::vector<int>{0, 1, 2, 3}));
 }
 

@@ -70,10 +70,12 @@ TEST_F(ImporterTest, AnyCutIntoPiecesGivesTheSameSession) {
       EXPECT_EQ((*outcome)->revision, 1);
       EXPECT_EQ(session->revision(), 1);
       EXPECT_EQ(ChecksumOf(*session), expected.checksum());
-      EXPECT_TRUE(session->Read([&](const SessionView& view) {
-        ExpectEqualsOracle(view.mesh, ModelOf(expected));
-        return absl::OkStatus();
-      }).ok());
+      EXPECT_TRUE(session
+                      ->Read([&](const SessionView& view) {
+                        ExpectEqualsOracle(view.mesh, ModelOf(expected));
+                        return absl::OkStatus();
+                      })
+                      .ok());
     }
   }
 }
@@ -89,16 +91,20 @@ TEST_F(ImporterTest, ElementIGetsSlotIOfItsKindWhateverOrderTheBlocksHave) {
   ASSERT_TRUE(staged.AddElements(ElementType::kTetrahedron, Ids({3, 4, 5, 6})).ok());
   ASSERT_TRUE(staged.AddPositions(Positions(7)).ok());
   ASSERT_TRUE(importer->Finish(monitor_).ok());
-  ASSERT_TRUE(session->Read([](const SessionView& view) {
-    const Mesh& mesh = view.mesh;
-    const auto starts_with = [&](EntityId id, Slot first) { return mesh.VerticesOf(id)[0] == VertexId(first); };
-    EXPECT_TRUE(starts_with(EdgeId(0), 6) && mesh.IsElement(EdgeId(0)));
-    EXPECT_TRUE(starts_with(FaceId(0), 4) && mesh.IsElement(FaceId(0)));
-    EXPECT_TRUE(starts_with(FaceId(1), 0) && mesh.IsElement(FaceId(1)));
-    EXPECT_TRUE(starts_with(CellId(0), 0) && starts_with(CellId(1), 3));
-    EXPECT_THAT(Validate(mesh), IsEmpty());
-    return absl::OkStatus();
-  }).ok());
+  ASSERT_TRUE(session
+                  ->Read([](const SessionView& view) {
+                    const Mesh& mesh = view.mesh;
+                    const auto starts_with = [&](EntityId id, Slot first) {
+                      return mesh.VerticesOf(id)[0] == VertexId(first);
+                    };
+                    EXPECT_TRUE(starts_with(EdgeId(0), 6) && mesh.IsElement(EdgeId(0)));
+                    EXPECT_TRUE(starts_with(FaceId(0), 4) && mesh.IsElement(FaceId(0)));
+                    EXPECT_TRUE(starts_with(FaceId(1), 0) && mesh.IsElement(FaceId(1)));
+                    EXPECT_TRUE(starts_with(CellId(0), 0) && starts_with(CellId(1), 3));
+                    EXPECT_THAT(Validate(mesh), IsEmpty());
+                    return absl::OkStatus();
+                  })
+                  .ok());
 }
 
 TEST_F(ImporterTest, AttributesFollowTheEntities) {
@@ -108,14 +114,17 @@ TEST_F(ImporterTest, AttributesFollowTheEntities) {
   ASSERT_TRUE(importer->staged().AddRows(kMaterial, BytesOf(std::vector<int32_t>{42})).ok());
   ASSERT_TRUE(importer->staged().AddRows(kTemperature, BytesOf(std::vector<double>{3, 4})).ok());
   ASSERT_TRUE(importer->Finish(monitor_).ok());
-  ASSERT_TRUE(session->Read([](const SessionView& view) {
-    const Mesh& mesh = view.mesh;
-    const auto row = mesh.attributes()[mesh.FindAttribute("temperature", EntityKind::kVertex)].Row(2);
-    const double expected = 3;
-    EXPECT_EQ(std::memcmp(row.data(), &expected, 8), 0);
-    EXPECT_EQ(mesh.attributes()[mesh.FindAttribute("material", EntityKind::kCell)].Row(0)[0], 42);
-    return absl::OkStatus();
-  }).ok());
+  ASSERT_TRUE(
+      session
+          ->Read([](const SessionView& view) {
+            const Mesh& mesh = view.mesh;
+            const auto row = mesh.attributes()[mesh.FindAttribute("temperature", EntityKind::kVertex)].Row(2);
+            const double expected = 3;
+            EXPECT_EQ(std::memcmp(row.data(), &expected, 8), 0);
+            EXPECT_EQ(mesh.attributes()[mesh.FindAttribute("material", EntityKind::kCell)].Row(0)[0], 42);
+            return absl::OkStatus();
+          })
+          .ok());
 }
 
 TEST_F(ImporterTest, HostilePiecesAreRefusedByIndex) {
@@ -129,21 +138,27 @@ TEST_F(ImporterTest, HostilePiecesAreRefusedByIndex) {
     ExpectStillEmpty(session);
   };
   using Doubles = std::vector<double>;
-  expect(reason::kNonFinite, "5", [&](StagedMesh& s) { return s.AddPositions(BytesOf(Doubles{0, 0, 0, 0, 0, nan})); });
-  expect(reason::kNonFinite, "4", [&](StagedMesh& s) { return s.AddPositions(BytesOf(Doubles{-inf, 0, 0})); });
+  expect(reason::kNonFinite, "5", [&](StagedMesh& s) {
+    return s.AddPositions(BytesOf(Doubles{0, 0, 0, 0, 0, nan}));
+  });
+  expect(reason::kNonFinite, "4", [&](StagedMesh& s) {
+    return s.AddPositions(BytesOf(Doubles{-inf, 0, 0}));
+  });
   expect(reason::kBadArrayLength, "5", [](StagedMesh& s) { return s.AddPositions(std::string(25, 0)); });
   expect(reason::kBadArrayLength, "4", [](StagedMesh& s) { return s.AddPositions("x"); });
   expect(reason::kBadArrayLength, "2",
          [](StagedMesh& s) { return s.AddElements(ElementType::kTetrahedron, std::string(20, 0)); });
   expect(reason::kBadArrayLength, "1",
          [](StagedMesh& s) { return s.AddElements(ElementType::kHexahedron, std::string(16, 0)); });
-  expect(reason::kBadElementType, "1",
-         [](StagedMesh& s) { return s.AddElements(ElementType::kUnspecified, Ids({0, 1})); });
+  expect(reason::kBadElementType, "1", [](StagedMesh& s) {
+    return s.AddElements(ElementType::kUnspecified, Ids({0, 1}));
+  });
   expect(reason::kNonFinite, "1", [&](StagedMesh& s) {
     EXPECT_TRUE(s.AddRows(kTemperature, BytesOf(Doubles{0})).ok());
     return s.AddRows(kTemperature, BytesOf(Doubles{nan}));
   });
-  expect(reason::kBadArrayLength, "1", [](StagedMesh& s) { return s.AddRows(kTemperature, std::string(9, 0)); });
+  expect(reason::kBadArrayLength, "1",
+         [](StagedMesh& s) { return s.AddRows(kTemperature, std::string(9, 0)); });
   expect(reason::kBadArgument, "", [](StagedMesh& s) {
     EXPECT_TRUE(s.AddRows(kTemperature, std::string(8, 0)).ok());
     AttributeSpec other = kTemperature;
@@ -172,12 +187,10 @@ TEST_F(ImporterTest, HostileWholesAreRefusedByIndex) {
   expect(reason::kUnknownEntity, "ids", "2147483648", {}, add(ElementType::kWireEdge, {0, kNewVertex}));
   expect(reason::kCountMismatch, "field", "num_vertices", {.num_vertices = 5}, nothing);
   expect(reason::kCountMismatch, "actual", "1", {.num_elements = 1'000'000}, nothing);
-  expect(reason::kCountMismatch, "attribute", "temperature", {}, [](StagedMesh& s) {
-    EXPECT_TRUE(s.AddRows(kTemperature, std::string(3 * 8, 0)).ok());
-  });
-  expect(reason::kCountMismatch, "expected", "1", {}, [](StagedMesh& s) {
-    EXPECT_TRUE(s.AddRows(kMaterial, std::string(2 * 4, 0)).ok());
-  });
+  expect(reason::kCountMismatch, "attribute", "temperature", {},
+         [](StagedMesh& s) { EXPECT_TRUE(s.AddRows(kTemperature, std::string(3 * 8, 0)).ok()); });
+  expect(reason::kCountMismatch, "expected", "1", {},
+         [](StagedMesh& s) { EXPECT_TRUE(s.AddRows(kMaterial, std::string(2 * 4, 0)).ok()); });
 }
 
 TEST_F(ImporterTest, RefusedDuplicatesNameTheElement) {
@@ -269,7 +282,8 @@ TEST_F(ImporterTest, DeletingTheSessionMeanwhileIsSaid) {
   const SessionPtr session = daemon_.NewSession();
   const auto importer = StartTet(session);
   ASSERT_TRUE(daemon_.registry().Delete("mesh", "").ok());
-  EXPECT_EQ(RefusalOf(importer->Finish(monitor_)), (Refusal{absl::StatusCode::kNotFound, reason::kSessionDeleted}));
+  EXPECT_EQ(RefusalOf(importer->Finish(monitor_)),
+            (Refusal{absl::StatusCode::kNotFound, reason::kSessionDeleted}));
 }
 
 TEST_F(ImporterTest, ImportsAtOnceAreLimited) {
@@ -293,7 +307,8 @@ TEST(ImporterLimitsTest, LimitsAreNamedBeforeAndWhileReceiving) {
   ImportGate gate(2);
   const SessionPtr session = daemon.NewSession();
   const auto expect = [](const absl::Status& status, const char* limit) {
-    EXPECT_EQ(RefusalOf(status), (Refusal{absl::StatusCode::kResourceExhausted, reason::kLimitExceeded})) << status;
+    EXPECT_EQ(RefusalOf(status), (Refusal{absl::StatusCode::kResourceExhausted, reason::kLimitExceeded}))
+        << status;
     EXPECT_EQ(MetadataOf(status, "limit"), limit);
   };
   expect(Importer::Start(session, gate, {.num_vertices = 11}).status(), "max_vertices");

@@ -55,10 +55,12 @@ TEST(QueriesTest, All16RelationsAreThoseOfTheMesh) {
     SCOPED_TRACE(named.name);
     const SessionPtr session = daemon.NewSession("m" + std::to_string(number++));
     MustApply(*session, EditsOf(named.mesh));
-    ASSERT_TRUE(session->Read([&](const SessionView& view) {
-      EXPECT_EQ(view.mesh.checksum(), ByDimension(named.mesh).checksum());
-      return absl::OkStatus();
-    }).ok());
+    ASSERT_TRUE(session
+                    ->Read([&](const SessionView& view) {
+                      EXPECT_EQ(view.mesh.checksum(), ByDimension(named.mesh).checksum());
+                      return absl::OkStatus();
+                    })
+                    .ok());
     for (EntityKind from : kEntityKinds) {
       for (EntityKind to : kEntityKinds) {
         const auto answer = QueryNeighbors(*session, {from, to}, {});
@@ -66,13 +68,15 @@ TEST(QueriesTest, All16RelationsAreThoseOfTheMesh) {
         EXPECT_EQ(answer->revision, 1);
         std::vector<Slot> ids;
         const CsrTable table = Join(*answer, &ids);
-        EXPECT_TRUE(session->Read([&](const SessionView& view) {
-          EXPECT_EQ(ids, LiveSlots(view.mesh, from));
-          const CsrTable expected = Neighbors(view.mesh, {from, to}, ids);
-          EXPECT_EQ(table.offsets, expected.offsets);
-          EXPECT_EQ(table.ids, expected.ids);
-          return absl::OkStatus();
-        }).ok());
+        EXPECT_TRUE(session
+                        ->Read([&](const SessionView& view) {
+                          EXPECT_EQ(ids, LiveSlots(view.mesh, from));
+                          const CsrTable expected = Neighbors(view.mesh, {from, to}, ids);
+                          EXPECT_EQ(table.offsets, expected.offsets);
+                          EXPECT_EQ(table.ids, expected.ids);
+                          return absl::OkStatus();
+                        })
+                        .ok());
       }
     }
   }
@@ -176,24 +180,28 @@ TEST(QueriesTest, EntitiesTellWhatTheyAre) {
     ASSERT_TRUE(answer.ok());
     ASSERT_EQ(answer->chunks.size(), 1u);
     const EntitiesChunk& chunk = answer->chunks[0];
-    ASSERT_TRUE(session->Read([&](const SessionView& view) {
-      const Mesh& mesh = view.mesh;
-      EXPECT_EQ(chunk.ids, LiveSlots(mesh, kind));
-      for (size_t i = 0; i < chunk.ids.size(); ++i) {
-        const EntityId id(kind, chunk.ids[i]);
-        EXPECT_EQ(chunk.flags[i], mesh.IsElement(id) + 2 * mesh.IsOnBoundary(id) + 4 * mesh.IsDuplicate(id));
-        EXPECT_EQ(chunk.born_revisions[i], mesh.slots(kind).Born(id.slot));
-        if (kind == EntityKind::kVertex) {
-          EXPECT_EQ(chunk.positions[i], mesh.Position(VertexId(id.slot)));
-          continue;
-        }
-        EXPECT_EQ(chunk.types[i], mesh.Type(id));
-        const auto row = absl::MakeConstSpan(chunk.vertices)
-                             .subspan(chunk.vertex_offsets[i], chunk.vertex_offsets[i + 1] - chunk.vertex_offsets[i]);
-        EXPECT_EQ(row, mesh.VerticesOf(id));
-      }
-      return absl::OkStatus();
-    }).ok());
+    ASSERT_TRUE(session
+                    ->Read([&](const SessionView& view) {
+                      const Mesh& mesh = view.mesh;
+                      EXPECT_EQ(chunk.ids, LiveSlots(mesh, kind));
+                      for (size_t i = 0; i < chunk.ids.size(); ++i) {
+                        const EntityId id(kind, chunk.ids[i]);
+                        EXPECT_EQ(chunk.flags[i],
+                                  mesh.IsElement(id) + 2 * mesh.IsOnBoundary(id) + 4 * mesh.IsDuplicate(id));
+                        EXPECT_EQ(chunk.born_revisions[i], mesh.slots(kind).Born(id.slot));
+                        if (kind == EntityKind::kVertex) {
+                          EXPECT_EQ(chunk.positions[i], mesh.Position(VertexId(id.slot)));
+                          continue;
+                        }
+                        EXPECT_EQ(chunk.types[i], mesh.Type(id));
+                        const auto row = absl::MakeConstSpan(chunk.vertices)
+                                             .subspan(chunk.vertex_offsets[i],
+                                                      chunk.vertex_offsets[i + 1] - chunk.vertex_offsets[i]);
+                        EXPECT_EQ(row, mesh.VerticesOf(id));
+                      }
+                      return absl::OkStatus();
+                    })
+                    .ok());
   };
   for (EntityKind kind : kEntityKinds) check(kind);
 }
@@ -206,10 +214,12 @@ TEST(QueriesTest, BoundaryIsThatOfTheMesh) {
     const auto answer = QueryBoundary(*session, kind);
     ASSERT_TRUE(answer.ok());
     std::vector<Slot> expected;
-    ASSERT_TRUE(session->Read([&](const SessionView& view) {
-      view.mesh.Boundary(kind).ForEach([&](Slot slot) { expected.push_back(slot); });
-      return absl::OkStatus();
-    }).ok());
+    ASSERT_TRUE(session
+                    ->Read([&](const SessionView& view) {
+                      view.mesh.Boundary(kind).ForEach([&](Slot slot) { expected.push_back(slot); });
+                      return absl::OkStatus();
+                    })
+                    .ok());
     EXPECT_EQ(answer->ids, expected);
     EXPECT_FALSE(expected.empty());
   }
@@ -222,7 +232,8 @@ TEST(QueriesTest, SurfaceHasTheBoundaryAndTheFacesThatAreElements) {
   const SessionPtr session = daemon.NewSession();
   EXPECT_EQ(QuerySurface(*session, 14).status().code(), absl::StatusCode::kFailedPrecondition);
   MustApply(*session, EditsOf(HexGrid(2, 1, 1)));
-  MustApply(*session, {AddVerticesEdit{{{9, 9, 9}}}, AddElementsEdit{ElementType::kTriangle, {0, 1, kNewVertex}}});
+  MustApply(*session,
+            {AddVerticesEdit{{{9, 9, 9}}}, AddElementsEdit{ElementType::kTriangle, {0, 1, kNewVertex}}});
   const auto answer = QuerySurface(*session, 14);
   ASSERT_TRUE(answer.ok()) << answer.status();
   EXPECT_EQ(answer->revision, 2);
@@ -271,8 +282,9 @@ TEST(ExportTest, AttributesTravelWithTheirIds) {
   const SessionPtr session = daemon.NewSession();
   const AttributeSpec spec{"t", EntityKind::kFace, AttributeType::kInt32, 1};
   MustApply(*session, AddTet());
-  MustApply(*session, {AddAttributeEdit{spec}, AddAttributeEdit{{"none", EntityKind::kCell, AttributeType::kInt32, 1}},
-                       SetAttributeEdit{spec, {2}, {7, 0, 0, 0}}});
+  MustApply(*session,
+            {AddAttributeEdit{spec}, AddAttributeEdit{{"none", EntityKind::kCell, AttributeType::kInt32, 1}},
+             SetAttributeEdit{spec, {2}, {7, 0, 0, 0}}});
   const auto answer = ExportSession(*session);
   ASSERT_TRUE(answer.ok());
   const auto& rows = std::get<ExportedRows>(answer->chunks[2]);

@@ -17,13 +17,14 @@ std::vector<std::string> NamesAfter(const SessionRegistry& registry, absl::strin
 TEST(RegistryTest, NamesAreChecked) {
   Daemon daemon;
   const Refusal bad{absl::StatusCode::kInvalidArgument, reason::kBadSessionName};
-  for (const std::string& name : {std::string(), std::string("-a"), std::string(".a"), std::string("a b"),
-                                  std::string("a/b"), std::string("\xc3\xa9"), std::string("a\0b", 3),
-                                  std::string(65, 'a')}) {
+  for (const std::string& name :
+       {std::string(), std::string("-a"), std::string(".a"), std::string("a b"), std::string("a/b"),
+        std::string("\xc3\xa9"), std::string("a\0b", 3), std::string(65, 'a')}) {
     EXPECT_EQ(RefusalOf(daemon.registry().Create(name, {}, "")), bad) << name;
     EXPECT_EQ(RefusalOf(daemon.registry().Find(name)), bad) << name;
   }
-  for (const std::string& name : {std::string("a"), std::string("9"), std::string("A_b.c-d"), std::string(64, 'a')}) {
+  for (const std::string& name :
+       {std::string("a"), std::string("9"), std::string("A_b.c-d"), std::string(64, 'a')}) {
     EXPECT_TRUE(daemon.registry().Create(name, {}, "").ok()) << name;
   }
 }
@@ -33,7 +34,8 @@ TEST(RegistryTest, ANameIsTakenOnce) {
   daemon.NewSession("a");
   EXPECT_EQ(RefusalOf(daemon.registry().Create("a", {}, "")),
             (Refusal{absl::StatusCode::kAlreadyExists, reason::kSessionExists}));
-  EXPECT_EQ(RefusalOf(daemon.registry().Find("b")), (Refusal{absl::StatusCode::kNotFound, reason::kSessionNotFound}));
+  EXPECT_EQ(RefusalOf(daemon.registry().Find("b")),
+            (Refusal{absl::StatusCode::kNotFound, reason::kSessionNotFound}));
 }
 
 TEST(RegistryTest, ARetriedCreationGetsTheFirstAnswer) {

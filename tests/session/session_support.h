@@ -10,11 +10,12 @@
 #include <string>
 #include <vector>
 
-#include "absl/synchronization/mutex.h"
+#include "absl/time/clock.h"
 #include "core/delta/mirror.h"
 #include "core/edit/transaction.h"
 #include "server/session/follower.h"
 #include "server/session/importer/importer.h"
+#include "server/session/mutex.h"
 #include "server/session/registry.h"
 #include "server/session/session.h"
 
@@ -23,6 +24,17 @@ namespace dynmesh::testing {
 
 /// How long a test waits for something that must happen.
 inline constexpr absl::Duration kPatience = absl::Seconds(60);
+
+/// Waits until pred() holds; false when that takes too long. REQUIRES: whoever makes it true notifies
+/// `changed`.
+template <typename Pred>
+bool AwaitThat(Mutex* mu, CondVar& changed, Pred pred) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu) {
+  const absl::Time deadline = absl::Now() + kPatience;
+  while (!pred()) {
+    if (!changed.WaitUntil(mu, deadline)) return pred();
+  }
+  return true;
+}
 
 /// Threads, and sessions on them. Sessions may be used after Stop(), but nothing follows any more.
 class Daemon {
@@ -77,8 +89,8 @@ Refusal RefusalOf(const absl::StatusOr<T>& result) {
 /// Value of a metadata key, empty when absent.
 std::string MetadataOf(const absl::Status& status, absl::string_view key);
 
-/// Random batches of all kinds of edits for one session, from what its answers said. With other editors about,
-/// some batches are refused, which it learns by Forget().
+/// Random batches of all kinds of edits for one session, from what its answers said. With other editors
+/// about, some batches are refused, which it learns by Forget().
 class RandomBatches {
  public:
   explicit RandomBatches(uint32_t seed) : rng_(seed) {}
@@ -127,8 +139,8 @@ class RecordingSink : public DeltaSink {
 
   /// By hand: waits for a payload that is not acknowledged and acknowledges it.
   PayloadPtr TakeOne();
-  /// Whether a payload waits to be acknowledged.
-  bool HasUnacknowledged();
+  /// Waits until a payload is there to be acknowledged.
+  void AwaitUnacknowledged();
 
   /// Wait until the mirror has a consistent copy of `revision` or later, or fail the test.
   void AwaitRevision(int64_t revision);
@@ -142,7 +154,7 @@ class RecordingSink : public DeltaSink {
   /// Calls fn(mirror) without other threads.
   template <typename Fn>
   void WithMirror(Fn fn) {
-    absl::MutexLock lock(&mu_);
+    MutexLock lock(&mu_);
     fn(mirror_);
   }
 
@@ -153,7 +165,8 @@ class RecordingSink : public DeltaSink {
   const Acknowledge acknowledge_;
   std::shared_ptr<Follower> follower_;
   bool begun_ = false;
-  absl::Mutex mu_;
+  Mutex mu_;
+  CondVar changed_;
   Mirror mirror_ ABSL_GUARDED_BY(mu_);
   std::vector<PayloadPtr> payloads_ ABSL_GUARDED_BY(mu_);
   PayloadPtr unacknowledged_ ABSL_GUARDED_BY(mu_);

@@ -27,7 +27,7 @@ class SessionTest : public ::testing::Test {
   }
 
   ErrorDetail ExpectApplyRefused(Session& session, absl::StatusCode code, const char* why,
-                                  const std::vector<Edit>& edits, const ApplyOptions& options = {}) {
+                                 const std::vector<Edit>& edits, const ApplyOptions& options = {}) {
     return ExpectRefused(session, code, why, [&] { return session.Apply(edits, options).status(); });
   }
 
@@ -58,8 +58,8 @@ TEST_F(SessionTest, ABatchWithoutEditsAnswersWithTheCurrentState) {
 TEST_F(SessionTest, IfRevisionRefusesWhenSomebodyWasFaster) {
   const SessionPtr session = daemon_.NewSession();
   MustApply(*session, AddTet(), {.if_revision = 0});
-  const ErrorDetail detail = ExpectApplyRefused(*session, absl::StatusCode::kAborted, reason::kRevisionMismatch,
-                                                 AddTet(), {.if_revision = 0});
+  const ErrorDetail detail = ExpectApplyRefused(*session, absl::StatusCode::kAborted,
+                                                reason::kRevisionMismatch, AddTet(), {.if_revision = 0});
   EXPECT_EQ(detail.Find("expected"), "0");
   EXPECT_EQ(detail.Find("actual"), "1");
   ExpectApplyRefused(*session, absl::StatusCode::kAborted, reason::kRevisionMismatch, AddTet(),
@@ -72,8 +72,8 @@ TEST_F(SessionTest, AsOfRevisionRefusesIdsWhoseOccupantIsYounger) {
   MustApply(*session, {RemoveElementsEdit{EntityKind::kCell, {0}}});
   MustApply(*session, {AddElementsEdit{ElementType::kTetrahedron, {0, 1, 2, 3}}});
   const std::vector<Edit> remove = {RemoveElementsEdit{EntityKind::kCell, {0}}};
-  const ErrorDetail detail = ExpectApplyRefused(*session, absl::StatusCode::kNotFound, reason::kEntityRemoved, remove,
-                                                 {.as_of_revision = 1});
+  const ErrorDetail detail = ExpectApplyRefused(*session, absl::StatusCode::kNotFound, reason::kEntityRemoved,
+                                                remove, {.as_of_revision = 1});
   EXPECT_EQ(detail.Find("ids"), "0");
   EXPECT_EQ(detail.Find("edit"), "0");
   EXPECT_EQ(detail.Find("index"), "0");
@@ -82,8 +82,8 @@ TEST_F(SessionTest, AsOfRevisionRefusesIdsWhoseOccupantIsYounger) {
 
 TEST_F(SessionTest, AsOfRevisionMustNotLieInTheFuture) {
   const SessionPtr session = daemon_.NewSession();
-  const ErrorDetail detail = ExpectApplyRefused(*session, absl::StatusCode::kOutOfRange, reason::kRevisionInFuture,
-                                                 AddTet(), {.as_of_revision = 1});
+  const ErrorDetail detail = ExpectApplyRefused(*session, absl::StatusCode::kOutOfRange,
+                                                reason::kRevisionInFuture, AddTet(), {.as_of_revision = 1});
   EXPECT_EQ(detail.Find("requested"), "1");
   EXPECT_EQ(detail.Find("actual"), "0");
   ExpectApplyRefused(*session, absl::StatusCode::kInvalidArgument, reason::kBadArgument, AddTet(),
@@ -117,8 +117,8 @@ TEST_F(SessionTest, ARetryGetsTheFirstAnswer) {
 TEST_F(SessionTest, ARequestIdWithOtherContentIsRefused) {
   const SessionPtr session = daemon_.NewSession();
   MustApply(*session, AddTet(), {.request_id = "one"});
-  ExpectApplyRefused(*session, absl::StatusCode::kInvalidArgument, reason::kRequestIdReused, {AddSomeVertices(1)},
-                     {.request_id = "one"});
+  ExpectApplyRefused(*session, absl::StatusCode::kInvalidArgument, reason::kRequestIdReused,
+                     {AddSomeVertices(1)}, {.request_id = "one"});
   ExpectApplyRefused(*session, absl::StatusCode::kInvalidArgument, reason::kRequestIdReused, AddTet(),
                      {.as_of_revision = 1, .request_id = "one"});
 }
@@ -214,7 +214,8 @@ TEST_F(SessionTest, ASessionThatGrewTooLargeTakesRemovalsOnly) {
   Daemon daemon(limits);
   const SessionPtr session = daemon.NewSession();
   absl::Status status;
-  for (int i = 0; i < 10'000 && status.ok(); ++i) status = session->Apply({AddSomeVertices(500)}, {}).status();
+  for (int i = 0; i < 10'000 && status.ok(); ++i)
+    status = session->Apply({AddSomeVertices(500)}, {}).status();
   EXPECT_EQ(RefusalOf(status), (Refusal{absl::StatusCode::kResourceExhausted, reason::kLimitExceeded}));
   EXPECT_EQ(MetadataOf(status, "limit"), "max_session_bytes");
   MustApply(*session, {RemoveVerticesEdit{{0, 1, 2}}});
@@ -276,10 +277,12 @@ TEST_F(SessionTest, RandomBatchesLeaveASoundMesh) {
   }
   EXPECT_EQ(session->revision(), applied);
   EXPECT_GT(applied, 200);
-  EXPECT_TRUE(session->Read([](const SessionView& view) {
-    EXPECT_THAT(Validate(view.mesh), IsEmpty());
-    return absl::OkStatus();
-  }).ok());
+  EXPECT_TRUE(session
+                  ->Read([](const SessionView& view) {
+                    EXPECT_THAT(Validate(view.mesh), IsEmpty());
+                    return absl::OkStatus();
+                  })
+                  .ok());
 }
 
 }  // namespace

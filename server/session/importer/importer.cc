@@ -9,6 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/time/clock.h"
 #include "server/session/answer_memory.h"
+#include "server/session/session_errors.h"
 #include "spdlog/spdlog.h"
 
 namespace dynmesh {
@@ -27,12 +28,11 @@ absl::Status CheckAnnounced(const ImportOptions& options, const Limits& limits) 
 
 absl::Status CheckAnnouncedCount(absl::string_view what, uint64_t announced, uint64_t received) {
   if (announced == 0 || announced == received) return absl::OkStatus();
-  return InvalidArgument(
-      reason::kCountMismatch,
-      absl::StrCat(announced, " ", what, " were announced and ", received, " arrived"),
-      {{"field", absl::StrCat("num_", what)},
-       {"expected", absl::StrCat(announced)},
-       {"actual", absl::StrCat(received)}});
+  return InvalidArgument(reason::kCountMismatch,
+                         absl::StrCat(announced, " ", what, " were announced and ", received, " arrived"),
+                         {{"field", absl::StrCat("num_", what)},
+                          {"expected", absl::StrCat(announced)},
+                          {"actual", absl::StrCat(received)}});
 }
 
 /// Gives the freed pieces back to the system, so that staging does not count against a daemon for ever.
@@ -63,7 +63,10 @@ absl::StatusOr<std::unique_ptr<Importer>> Importer::Start(SessionPtr session, Im
 
 Importer::Importer(SessionPtr session, std::unique_ptr<ImportGate::Ticket> ticket,
                    const ImportOptions& options)
-    : session_(std::move(session)), ticket_(std::move(ticket)), options_(options), staged_(session_->limits()) {}
+    : session_(std::move(session)),
+      ticket_(std::move(ticket)),
+      options_(options),
+      staged_(session_->limits()) {}
 
 absl::StatusOr<Importer::OutcomePtr> Importer::Finish(ImportMonitor& monitor) {
   DYNMESH_RETURN_IF_ERROR(CheckCounts());
@@ -90,23 +93,18 @@ absl::StatusOr<Importer::OutcomePtr> Importer::BuildAndAdopt(ImportMonitor& moni
   DYNMESH_ASSIGN_OR_RETURN(Mesh mesh, builder.Build(std::move(staged_)));
   auto outcome = std::make_shared<ImportOutcome>();
   outcome->warnings = builder.warnings();
+  // Described before others can edit it: the answer speaks of the import alone.
+  outcome->info = session_->Describe(mesh, SummaryCache().Of(mesh), absl::Now());
   if (options_.validate_only) {
-    DYNMESH_ASSIGN_OR_RETURN(const SessionInfo present, session_->Info());
-    outcome->info = DescribeMesh(mesh, SummaryCache().Of(mesh));
-    outcome->info.name = present.name;
-    outcome->info.etag = present.etag;
-    outcome->info.settings = present.settings;
-    outcome->info.create_time = present.create_time;
-    outcome->info.update_time = present.update_time;
-    outcome->info.revision = present.revision;
-  } else {
-    DYNMESH_RETURN_IF_ERROR(session_->Adopt(mesh));
-    DYNMESH_ASSIGN_OR_RETURN(outcome->info, session_->Info());
-    spdlog::info("import session={} vertices={} cells={} build_ms={}", session_->name(),
-                 outcome->info.counts[0], outcome->info.counts[3],
-                 absl::ToInt64Milliseconds(absl::Now() - begin));
+    outcome->info.revision = 0;
+    outcome->info.etag.clear();
   }
   outcome->revision = outcome->info.revision;
+  if (monitor.cancelled()) return CallCancelled();
+  if (!options_.validate_only) DYNMESH_RETURN_IF_ERROR(session_->Adopt(mesh));
+  spdlog::info("import session={} vertices={} cells={} validate_only={} build_ms={}", session_->name(),
+               outcome->info.counts[0], outcome->info.counts[3], options_.validate_only,
+               absl::ToInt64Milliseconds(absl::Now() - begin));
   TrimHeap();
   return OutcomePtr(std::move(outcome));
 }

@@ -15,10 +15,10 @@ namespace {
 constexpr uint64_t kItemsPerTick = 16384;
 
 absl::Status VertexOutOfRange(Slot vertex, uint64_t num_vertices, uint64_t index) {
-  return InvalidArgument(
-      reason::kUnknownEntity,
-      absl::StrCat("element ", index, " names vertex ", vertex, ", but there are ", num_vertices, " vertices"),
-      {{"kind", "vertex"}, {"ids", absl::StrCat(vertex)}, {"index", absl::StrCat(index)}});
+  return InvalidArgument(reason::kUnknownEntity,
+                         absl::StrCat("element ", index, " names vertex ", vertex, ", but there are ",
+                                      num_vertices, " vertices"),
+                         {{"kind", "vertex"}, {"ids", absl::StrCat(vertex)}, {"index", absl::StrCat(index)}});
 }
 
 }  // namespace

@@ -51,13 +51,15 @@ absl::Status ShiftIndex(const absl::Status& status, uint64_t base) {
 
 absl::Status StagedMesh::AddPositions(std::string bytes) {
   if (bytes.size() % kPositionBytes != 0) {
-    return BadLength("positions", bytes.size(), kPositionBytes, num_vertices_ + bytes.size() / kPositionBytes);
+    return BadLength("positions", bytes.size(), kPositionBytes,
+                     num_vertices_ + bytes.size() / kPositionBytes);
   }
   const uint64_t total = num_vertices_ + bytes.size() / kPositionBytes;
   if (total > limits_.max_vertices) return LimitExceeded("max_vertices", limits_.max_vertices, total);
   if (const int64_t bad = FindNonFinite(bytes); bad >= 0) {
     const std::string index = absl::StrCat(num_vertices_ + bad / 3);
-    return InvalidArgument(reason::kNonFinite, absl::StrCat("the position of vertex ", index, " is not finite"),
+    return InvalidArgument(reason::kNonFinite,
+                           absl::StrCat("the position of vertex ", index, " is not finite"),
                            {{"kind", "vertex"}, {"index", index}});
   }
   DYNMESH_RETURN_IF_ERROR(ChargeMemory(bytes.size()));
@@ -111,8 +113,8 @@ absl::Status StagedMesh::CheckColumns() const {
     const uint64_t rows = column.rows.size() / column.spec.row_bytes();
     if (rows == expected) continue;
     return InvalidArgument(reason::kCountMismatch,
-                           absl::StrCat("attribute ", column.spec.name, " has ", rows, " rows for ", expected, " ",
-                                        EntityKindName(kind), " entities"),
+                           absl::StrCat("attribute ", column.spec.name, " has ", rows, " rows for ", expected,
+                                        " ", EntityKindName(kind), " entities"),
                            {{"attribute", column.spec.name},
                             {"expected", absl::StrCat(expected)},
                             {"actual", absl::StrCat(rows)}});

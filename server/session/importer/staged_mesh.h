@@ -32,8 +32,8 @@ struct StagedColumn {
 /// bytes that arrived. Memory grows with those and with nothing that a peer merely claims.
 ///
 /// Methods that add: INVALID_ARGUMENT with metadata "index", the position of the offender among the vertices,
-/// elements or rows of the whole import; RESOURCE_EXHAUSTED LIMIT_EXCEEDED. After an error the import is over.
-/// Thread safety: that of std::vector.
+/// elements or rows of the whole import; RESOURCE_EXHAUSTED LIMIT_EXCEEDED. After an error the import is
+/// over. Thread safety: that of std::vector.
 class StagedMesh {
  public:
   explicit StagedMesh(const Limits& limits) : limits_(limits) {}

@@ -1,0 +1,159 @@
+// The binary itself: flags, environment, ready file, signals, exit codes.
+
+#include <fcntl.h>
+#include <signal.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <thread>
+
+#include "absl/strings/match.h"
+#include "absl/strings/str_split.h"
+#include "absl/time/clock.h"
+#include "server/health_probe.h"
+#include "tests/server/server_support.h"
+
+namespace dynmesh::testing {
+namespace {
+
+std::string ReadFile(const std::string& path) {
+  std::ifstream file(path);
+  std::stringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+/// A dynmeshd with its output in a file.
+class Process {
+ public:
+  Process(const std::vector<std::string>& arguments, const std::vector<std::string>& environment)
+      : output_path_(::testing::TempDir() + "dynmeshd-" + std::to_string(getpid()) + ".out") {
+    std::vector<std::string> words = {DYNMESHD};
+    words.insert(words.end(), arguments.begin(), arguments.end());
+    std::vector<char*> argv, envp;
+    for (std::string& word : words) argv.push_back(word.data());
+    std::vector<std::string> variables = environment;
+    for (std::string& variable : variables) envp.push_back(variable.data());
+    argv.push_back(nullptr);
+    envp.push_back(nullptr);
+    posix_spawn_file_actions_t actions;
+    posix_spawn_file_actions_init(&actions);
+    posix_spawn_file_actions_addopen(&actions, 1, output_path_.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
+    posix_spawn_file_actions_adddup2(&actions, 1, 2);
+    EXPECT_EQ(posix_spawn(&pid_, DYNMESHD, &actions, nullptr, argv.data(), envp.data()), 0);
+    posix_spawn_file_actions_destroy(&actions);
+  }
+  ~Process() {
+    if (running_) {
+      Signal(SIGKILL);
+      Wait();
+    }
+    std::filesystem::remove(output_path_);
+  }
+
+  void Signal(int number) { kill(pid_, number); }
+
+  /// Exit code, or -signal.
+  int Wait() {
+    int status = 0;
+    EXPECT_EQ(waitpid(pid_, &status, 0), pid_);
+    running_ = false;
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
+  }
+
+  std::string output() const { return ReadFile(output_path_); }
+
+ private:
+  const std::string output_path_;
+  pid_t pid_ = 0;
+  bool running_ = true;
+};
+
+class DynmeshdTest : public ::testing::Test {
+ protected:
+  std::string ready_file_ = ::testing::TempDir() + "dynmeshd-" + std::to_string(getpid()) + ".ready";
+
+  std::vector<std::string> AwaitReady() {
+    const absl::Time deadline = absl::Now() + kPatience;
+    while (!std::filesystem::exists(ready_file_)) {
+      if (absl::Now() > deadline) {
+        ADD_FAILURE() << "not ready";
+        return {};
+      }
+      std::this_thread::yield();
+    }
+    return absl::StrSplit(ReadFile(ready_file_), '\n', absl::SkipEmpty());
+  }
+
+  /// Runs to the end and expects `code`; returns the output.
+  std::string Run(int code, const std::vector<std::string>& arguments,
+                  const std::vector<std::string>& environment = {}) {
+    Process process(arguments, environment);
+    EXPECT_EQ(process.Wait(), code) << process.output();
+    return process.output();
+  }
+};
+
+TEST_F(DynmeshdTest, ServesUntilSigtermAndExitsWith0) {
+  for (int number : {SIGTERM, SIGINT}) {
+    Process process({"--listen=127.0.0.1:0", "--ready_file=" + ready_file_}, {});
+    const auto addresses = AwaitReady();
+    ASSERT_EQ(addresses.size(), 1u);
+    EXPECT_TRUE(ProbeHealth(addresses[0], kPatience).ok());
+    EXPECT_EQ(Run(0, {"--health_check=" + addresses[0]}), "");
+    process.Signal(number);
+    EXPECT_EQ(process.Wait(), 0);
+    EXPECT_FALSE(std::filesystem::exists(ready_file_));
+    EXPECT_TRUE(absl::StrContains(Run(1, {"--health_check=" + addresses[0]}), addresses[0]));
+  }
+}
+
+TEST_F(DynmeshdTest, TheEnvironmentStandsInForFlags) {
+  const std::string socket = ::testing::TempDir() + "dynmeshd-" + std::to_string(getpid()) + ".sock";
+  Process process({"--ready_file=" + ready_file_, "--listen="},
+                  {"DYNMESHD_LISTEN=127.0.0.1:0,localhost:0", "DYNMESHD_UNIX_SOCKET=" + socket});
+  EXPECT_EQ(AwaitReady(), std::vector<std::string>{"unix:" + socket});  // the flag has the last word
+  process.Signal(SIGTERM);
+  EXPECT_EQ(process.Wait(), 0);
+  Process other({"--ready_file=" + ready_file_}, {"DYNMESHD_LISTEN=127.0.0.1:0,localhost:0"});
+  EXPECT_EQ(AwaitReady().size(), 2u);
+  other.Signal(SIGTERM);
+  EXPECT_EQ(other.Wait(), 0);
+}
+
+TEST_F(DynmeshdTest, WrongCallsSayWhatIsWrong) {
+  const auto expect = [&](const std::string& said, const std::vector<std::string>& arguments,
+                          const std::vector<std::string>& environment = {}) {
+    const std::string output = Run(1, arguments, environment);
+    EXPECT_TRUE(absl::StrContains(output, said)) << output;
+  };
+  expect("--allow_insecure", {"--listen=0.0.0.0:0"});
+  expect("nonsense", {"--nonsense"});
+  expect("unexpected argument 'serve'", {"serve"});
+  expect("DYNMESHD_MAX_SESSIONS", {}, {"DYNMESHD_MAX_SESSIONS=many"});
+  expect("host:port", {"--listen=7447"});
+  expect("log_level", {"--log_level=loud"});
+  expect("nothing to listen on", {"--listen="});
+}
+
+TEST_F(DynmeshdTest, TellsItsVersion) { EXPECT_TRUE(absl::StartsWith(Run(0, {"--version"}), "dynmeshd ")); }
+
+TEST_F(DynmeshdTest, EndsWithItsParent) {
+  // A thread that starts it and ends is enough of a parent.
+  std::unique_ptr<Process> process;
+  std::thread parent([&] {
+    process = std::make_unique<Process>(
+        std::vector<std::string>{"--listen=127.0.0.1:0", "--exit_with_parent", "--ready_file=" + ready_file_},
+        std::vector<std::string>{});
+    AwaitReady();
+  });
+  parent.join();
+  EXPECT_EQ(process->Wait(), 0);
+}
+
+}  // namespace
+}  // namespace dynmesh::testing

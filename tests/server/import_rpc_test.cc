@@ -1,0 +1,345 @@
+#include <cmath>
+#include <random>
+
+#include "tests/server/server_support.h"
+#include "tests/support/meshes.h"
+
+namespace dynmesh::testing {
+namespace {
+
+using ::testing::ElementsAre;
+
+class ImportRpcTest : public ServerTest {
+ protected:
+  ImportRpcTest() { EXPECT_TRUE(CreateSession("mesh").ok()); }
+
+  void ExpectStillEmpty() {
+    const v1::Session session = GetSession("mesh");
+    EXPECT_EQ(session.revision(), 0);
+    EXPECT_EQ(session.counts().vertices(), 0u);
+    EXPECT_EQ(session.checksum().topology(), 0u);
+  }
+
+  /// All chunks of an export.
+  std::vector<v1::ExportMeshResponse> Export(const std::string& session) {
+    PatientContext context;
+    v1::ExportMeshRequest request;
+    request.set_session(session);
+    const auto stream = sessions().ExportMesh(&context, request);
+    std::vector<v1::ExportMeshResponse> chunks(1);
+    while (stream->Read(&chunks.back())) chunks.emplace_back();
+    chunks.pop_back();
+    EXPECT_TRUE(stream->Finish().ok());
+    return chunks;
+  }
+};
+
+TEST_F(ImportRpcTest, AnyChunkingGivesTheSameSession) {
+  const Mesh mesh = TetGrid(6, 6, 6);
+  const size_t chunkings[] = {1, 7, 100, 1'000'000};
+  for (size_t items : chunkings) {
+    const std::string name = "chunks" + std::to_string(items);
+    ASSERT_TRUE(CreateSession(name).ok());
+    v1::ImportResult result;
+    ASSERT_TRUE(Import(name, mesh, &result, items).ok());
+    EXPECT_EQ(result.revision(), 1);
+    EXPECT_EQ(result.session().checksum().topology(), mesh.checksum().topology);
+    EXPECT_EQ(result.session().checksum().geometry(), mesh.checksum().geometry);
+    EXPECT_EQ(result.session().counts().faces(), mesh.NumLive(EntityKind::kFace));
+  }
+}
+
+TEST_F(ImportRpcTest, AnExportCanBeImported) {
+  int number = 0;
+  for (NamedMesh& named : AllMeshes()) {
+    SCOPED_TRACE(named.name);
+    const std::string from = "from" + std::to_string(number), to = "to" + std::to_string(number);
+    ++number;
+    ASSERT_TRUE(CreateSession(from).ok());
+    ASSERT_TRUE(CreateSession(to).ok());
+    ASSERT_TRUE(Import(from, named.mesh).ok());
+    std::vector<v1::ImportMeshRequest> requests = {ImportHead(to)};
+    size_t types = 0;
+    for (const v1::ExportMeshResponse& chunk : Export(from)) {
+      EXPECT_EQ(chunk.revision(), 1);
+      v1::ImportMeshRequest& request = requests.emplace_back();
+      if (chunk.has_vertices()) request.set_positions(chunk.vertices().positions());
+      if (chunk.has_elements()) *request.mutable_elements() = chunk.elements().block();
+      types += chunk.has_elements();
+    }
+    ASSERT_TRUE(ImportRequests(requests).ok());
+    const v1::Session a = GetSession(from), b = GetSession(to);
+    EXPECT_EQ(a.counts().SerializeAsString(), b.counts().SerializeAsString());
+    EXPECT_EQ(a.boundary_counts().SerializeAsString(), b.boundary_counts().SerializeAsString());
+    // With one type of elements ids are dense and in order, so the copy is equal to the last id.
+    EXPECT_TRUE(types > 1 || a.checksum().SerializeAsString() == b.checksum().SerializeAsString());
+  }
+}
+
+TEST_F(ImportRpcTest, AnExportOfAnEmptySessionTellsItsRevision) {
+  const auto chunks = Export("mesh");
+  ASSERT_EQ(chunks.size(), 1u);
+  EXPECT_EQ(chunks[0].revision(), 0);
+}
+
+TEST_F(ImportRpcTest, AttributesTravelBothWays) {
+  v1::ImportMeshRequest rows;
+  *rows.mutable_attribute()->mutable_spec() = Spec("t", v1::ENTITY_KIND_VERTEX, v1::ATTRIBUTE_TYPE_INT32, 1);
+  rows.mutable_attribute()->set_values(Bytes<int32_t>({1, 2, 3, 4}));
+  ASSERT_TRUE(ImportRequests({ImportHead("mesh", 4, 1), ImportPositions(SomePoints(4)), rows,
+                              ImportElements(v1::ELEMENT_TYPE_TETRAHEDRON, {0, 1, 2, 3})})
+                  .ok());
+  const auto chunks = Export("mesh");
+  ASSERT_EQ(chunks.size(), 3u);
+  EXPECT_EQ(chunks[2].attribute().spec().name(), "t");
+  EXPECT_THAT(Array<int32_t>(chunks[2].attribute().values()), ElementsAre(1, 2, 3, 4));
+}
+
+TEST_F(ImportRpcTest, ProgressIsReported) {
+  const Mesh mesh = TetGrid(22, 22, 22);
+  PatientContext context;
+  const auto stream = sessions().ImportMesh(&context);
+  stream->Write(ImportHead("mesh", mesh.NumLive(EntityKind::kVertex)));
+  std::vector<Point> points;
+  mesh.slots(EntityKind::kVertex).live().ForEach([&](Slot slot) {
+    points.push_back(mesh.Position(VertexId(slot)));
+  });
+  stream->Write(ImportPositions(points));
+  std::vector<Slot> ids;
+  mesh.slots(EntityKind::kCell).live().ForEach([&](Slot slot) {
+    for (VertexId v : mesh.Vertices(CellId(slot))) ids.push_back(v.slot());
+  });
+  stream->Write(ImportElements(v1::ELEMENT_TYPE_TETRAHEDRON, ids));
+  stream->WritesDone();
+  std::vector<v1::ImportProgress> reports;
+  v1::ImportMeshResponse response;
+  while (stream->Read(&response)) {
+    if (response.has_progress()) reports.push_back(response.progress());
+  }
+  EXPECT_TRUE(stream->Finish().ok());
+  EXPECT_TRUE(response.has_result());
+  ASSERT_GE(reports.size(), 3u);
+  EXPECT_EQ(reports.front().phase(), "receiving");
+  EXPECT_EQ(reports.front().total(), points.size());
+  EXPECT_EQ(reports.back().phase(), "building");
+  EXPECT_EQ(reports.back().total(), points.size() + ids.size() / 4);
+  EXPECT_GT(reports.back().done(), 0u);
+}
+
+struct ImportCase {
+  const char* name;
+  std::vector<v1::ImportMeshRequest> requests;
+  grpc::StatusCode code;
+  const char* reason;
+  const char* key;
+  const char* value;
+};
+
+TEST_F(ImportRpcTest, HostileImportsAreRefusedByIndexAndLeaveNothing) {
+  const auto head = ImportHead("mesh");
+  const auto points = ImportPositions(SomePoints(4));
+  const auto tet = ImportElements(v1::ELEMENT_TYPE_TETRAHEDRON, {0, 1, 2, 3});
+  const double inf = INFINITY;
+  v1::ImportMeshRequest half, odd_type, rows_with_ids, odd_rows;
+  half.set_positions(std::string(23, '\0'));
+  odd_type.mutable_elements()->set_type(static_cast<v1::ElementType>(200));
+  *rows_with_ids.mutable_attribute()->mutable_spec() =
+      Spec("t", v1::ENTITY_KIND_VERTEX, v1::ATTRIBUTE_TYPE_INT32, 1);
+  odd_rows = rows_with_ids;
+  rows_with_ids.mutable_attribute()->set_ids(Bytes<Slot>({0}));
+  odd_rows.mutable_attribute()->set_values("12345");
+  constexpr grpc::StatusCode kInvalid = grpc::INVALID_ARGUMENT;
+  const std::vector<ImportCase> cases = {
+      {"no message", {}, kInvalid, reason::kBadArgument, "field", "header"},
+      {"no header", {points}, kInvalid, reason::kBadArgument, "field", "header"},
+      {"two headers", {head, head}, kInvalid, reason::kBadArgument, "field", "header"},
+      {"empty message", {head, v1::ImportMeshRequest()}, kInvalid, reason::kBadArgument, "field", "part"},
+      {"empty header", {ImportHead("")}, kInvalid, reason::kBadSessionName, "field", "name"},
+      {"no such session",
+       {ImportHead("nobody")},
+       grpc::NOT_FOUND,
+       reason::kSessionNotFound,
+       "session",
+       "nobody"},
+      {"NaN",
+       {head, points, ImportPositions({{0, 0, 0}, {0, NAN, 0}})},
+       kInvalid,
+       reason::kNonFinite,
+       "index",
+       "5"},
+      {"infinite", {head, ImportPositions({{0, 0, -inf}})}, kInvalid, reason::kNonFinite, "index", "0"},
+      {"half a point", {head, half}, kInvalid, reason::kBadArrayLength, "index", "0"},
+      {"half a tet",
+       {head, points, tet, ImportElements(v1::ELEMENT_TYPE_TETRAHEDRON, {0, 1, 2})},
+       kInvalid,
+       reason::kBadArrayLength,
+       "index",
+       "1"},
+      {"odd type", {head, points, odd_type}, kInvalid, reason::kBadElementType, "index", "0"},
+      {"id out of range",
+       {head, points, tet, ImportElements(v1::ELEMENT_TYPE_WIRE_EDGE, {0, 1, 1, 4})},
+       kInvalid,
+       reason::kUnknownEntity,
+       "index",
+       "2"},
+      {"huge id",
+       {head, points, ImportElements(v1::ELEMENT_TYPE_WIRE_EDGE, {0, 0xffffffffu})},
+       kInvalid,
+       reason::kUnknownEntity,
+       "ids",
+       "4294967295"},
+      {"claims more vertices",
+       {ImportHead("mesh", 100'000'000), points},
+       kInvalid,
+       reason::kCountMismatch,
+       "actual",
+       "4"},
+      {"claims fewer elements",
+       {ImportHead("mesh", 0, 1), points, tet, tet},
+       kInvalid,
+       reason::kCountMismatch,
+       "actual",
+       "2"},
+      {"claims absurdly",
+       {ImportHead("mesh", ~uint64_t{0})},
+       grpc::RESOURCE_EXHAUSTED,
+       reason::kLimitExceeded,
+       "limit",
+       "max_vertices"},
+      {"rows with ids", {head, points, rows_with_ids}, kInvalid, reason::kBadArgument, "field", "ids"},
+      {"odd rows", {head, points, odd_rows}, kInvalid, reason::kBadArrayLength, "index", "1"},
+  };
+  for (const ImportCase& hostile : cases) {
+    SCOPED_TRACE(hostile.name);
+    ExpectError(ImportRequests(hostile.requests), hostile.code, hostile.reason, hostile.key, hostile.value);
+    ExpectStillEmpty();
+  }
+  ASSERT_TRUE(Import("mesh", OneTet()).ok());
+  ExpectError(Import("mesh", OneTet()), grpc::FAILED_PRECONDITION, reason::kSessionNotEmpty, "revision", "1");
+  EXPECT_EQ(GetSession("mesh").revision(), 1);
+}
+
+TEST_F(ImportRpcTest, AnEmptyImportIsRevision1) {
+  v1::ImportResult result;
+  ASSERT_TRUE(ImportRequests({ImportHead("mesh")}, &result).ok());
+  EXPECT_EQ(result.revision(), 1);
+}
+
+TEST_F(ImportRpcTest, ValidateOnlyLeavesTheSessionEmpty) {
+  auto head = ImportHead("mesh");
+  head.mutable_header()->set_validate_only(true);
+  v1::ImportResult result;
+  ASSERT_TRUE(ImportRequests({head, ImportPositions(SomePoints(3)),
+                              ImportElements(v1::ELEMENT_TYPE_TRIANGLE, {0, 1, 2, 2, 1, 0})},
+                             &result)
+                  .ok());
+  EXPECT_EQ(result.revision(), 0);
+  EXPECT_EQ(result.session().counts().faces(), 2u);
+  EXPECT_EQ(result.warnings(0).reason(), "DUPLICATE_ELEMENT");
+  ExpectStillEmpty();
+}
+
+TEST_F(ImportRpcTest, ARetryGetsTheFirstAnswer) {
+  auto head = ImportHead("mesh");
+  head.mutable_header()->set_request_id("once");
+  v1::ImportResult first, again;
+  ASSERT_TRUE(ImportRequests({head, ImportPositions(SomePoints(3))}, &first).ok());
+  MustApply(TetBatch("mesh"));
+  ASSERT_TRUE(ImportRequests({head, ImportPositions(SomePoints(1)), ImportPositions({SomePoints(3)[1]}),
+                              ImportPositions({SomePoints(3)[2]})},
+                             &again)
+                  .ok());
+  EXPECT_EQ(first.SerializeAsString(), again.SerializeAsString());
+  ExpectError(ImportRequests({head, ImportPositions(SomePoints(4))}), grpc::INVALID_ARGUMENT,
+              reason::kRequestIdReused);
+}
+
+TEST_F(ImportRpcTest, AnImportCancelledBeforeItsEndLeavesTheSessionEmpty) {
+  for (int i = 0; i < 100; ++i) {
+    PatientContext context;
+    const auto stream = sessions().ImportMesh(&context);
+    stream->Write(ImportHead("mesh"));
+    for (int k = 0; k < i % 4; ++k) stream->Write(ImportPositions(SomePoints(100)));
+    context.TryCancel();
+    EXPECT_EQ(stream->Finish().error_code(), grpc::CANCELLED);
+    ExpectStillEmpty();
+  }
+  ASSERT_TRUE(Import("mesh", OneTet()).ok());
+}
+
+TEST_F(ImportRpcTest, AnImportCancelledWhileItIsBuiltIsDoneWholeOrNotAtAll) {
+  const Mesh mesh = TetGrid(12, 12, 12);
+  std::vector<Point> points;
+  std::vector<Slot> ids;
+  mesh.slots(EntityKind::kVertex).live().ForEach([&](Slot slot) {
+    points.push_back(mesh.Position(VertexId(slot)));
+  });
+  mesh.slots(EntityKind::kCell).live().ForEach([&](Slot slot) {
+    for (VertexId v : mesh.Vertices(CellId(slot))) ids.push_back(v.slot());
+  });
+  for (int i = 0; i < 20; ++i) {
+    const std::string name = "s" + std::to_string(i);
+    ASSERT_TRUE(CreateSession(name).ok());
+    PatientContext context;
+    const auto stream = sessions().ImportMesh(&context);
+    stream->Write(ImportHead(name));
+    stream->Write(ImportPositions(points));
+    stream->Write(ImportElements(v1::ELEMENT_TYPE_TETRAHEDRON, ids));
+    stream->WritesDone();
+    v1::ImportMeshResponse response;
+    while (stream->Read(&response) && response.progress().phase() != "building") {
+    }
+    context.TryCancel();
+    EXPECT_EQ(stream->Finish().error_code(), grpc::CANCELLED);
+    const v1::Session session = GetSession(name);
+    EXPECT_TRUE(session.revision() == 0 || session.counts().cells() == mesh.NumLive(EntityKind::kCell));
+  }
+}
+
+TEST_F(ImportRpcTest, AConnectionThatDropsNeverLeavesAPartOfAMesh) {
+  for (int i = 0; i < 20; ++i) {
+    const auto stub = v1::SessionService::NewStub(NewChannel());
+    grpc::ClientContext context;
+    context.set_deadline(std::chrono::system_clock::now() + std::chrono::milliseconds(5 + i));
+    const auto stream = stub->ImportMesh(&context);
+    stream->Write(ImportHead("mesh"));
+    while (stream->Write(ImportPositions(SomePoints(50)))) {
+    }
+    EXPECT_FALSE(stream->Finish().ok());
+    ExpectStillEmpty();
+  }
+}
+
+TEST_F(ImportRpcTest, ImportsAtOnceAreLimited) {
+  Limits limits;
+  limits.max_concurrent_imports = 1;
+  StartServer(limits);
+  ASSERT_TRUE(CreateSession("mesh").ok());
+  PatientContext context;
+  const auto stream = sessions().ImportMesh(&context);
+  stream->Write(ImportHead("mesh"));
+  stream->Write(ImportPositions(SomePoints(100'000)));
+  v1::ImportMeshResponse response;
+  ASSERT_TRUE(stream->Read(&response));  // it has been let in
+  ExpectError(ImportRequests({ImportHead("mesh")}), grpc::RESOURCE_EXHAUSTED, reason::kLimitExceeded, "limit",
+              "max_concurrent_imports");
+  stream->WritesDone();
+  while (stream->Read(&response)) {
+  }
+  ASSERT_TRUE(stream->Finish().ok());
+  ASSERT_TRUE(CreateSession("next").ok());
+  EXPECT_TRUE(ImportRequests({ImportHead("next")}).ok());
+}
+
+TEST_F(ImportRpcTest, LargeMessagesAreRefusedByName) {
+  Limits limits;
+  limits.max_message_bytes = 10'000;
+  StartServer(limits);
+  ASSERT_TRUE(CreateSession("mesh").ok());
+  ExpectError(ImportRequests({ImportHead("mesh"), ImportPositions(SomePoints(1000))}),
+              grpc::RESOURCE_EXHAUSTED, reason::kLimitExceeded, "limit", "max_message_bytes");
+  ExpectStillEmpty();
+}
+
+}  // namespace
+}  // namespace dynmesh::testing
