@@ -64,10 +64,10 @@ TEST_P(MeshRandomTest, PilesOfThousandsOnFewVerticesStaySound) {
   Mesh mesh;
   ElementModel model;
   RandomEditor editor(mesh, model, 3, options);
-  for (int batch = 0; batch < 12; ++batch) {
+  for (int batch = 0; batch < 8; ++batch) {
     const ElementModel before = model;
     mesh.BeginBatch();
-    for (int i = 0; i < 2000; ++i) editor.Edit();
+    for (int i = 0; i < 1000; ++i) editor.Edit();
     if (batch % 4 == 3) {
       mesh.Rollback();
       model = before;
