@@ -40,6 +40,17 @@ class BitSet {
     if (words_[word] == 0) summary_[word / 64] &= ~(uint64_t{1} << (word % 64));
   }
 
+  /// Makes it {0, ..., count - 1}.
+  void Fill(Slot count) {
+    const auto fill = [](size_t bits, std::vector<uint64_t>& words) {
+      words.assign((bits + 63) / 64, ~uint64_t{0});
+      if (bits % 64 != 0) words.back() = (uint64_t{1} << (bits % 64)) - 1;
+    };
+    fill(count, words_);
+    fill(words_.size(), summary_);
+    count_ = count;
+  }
+
   void Assign(Slot slot, bool member) { member ? Set(slot) : Clear(slot); }
 
   /// The smallest member >= slot, or kNoSlot.

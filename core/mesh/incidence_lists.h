@@ -29,6 +29,8 @@ class IncidenceLists {
  public:
   static constexpr uint32_t kMaxLength = 50'000'000;
   static constexpr uint32_t kIndexedLength = 512;
+  /// Of all lists together, with a margin for the room that size classes leave.
+  static constexpr uint64_t kMaxEntries = 0xc0000000u;
 
   absl::Span<const UpperId> Of(Slot lower) const {
     if (lower >= lists_.size()) return {};
@@ -63,6 +65,32 @@ class IncidenceLists {
       Move(lower, ClassFor(list.length + list.length / 4));
     } else if (list.length == 0) {
       Move(lower, 0);
+    }
+  }
+
+  /// Makes empty lists 0, 1, ... with room for `lengths` entries. REQUIRES: no list yet; fewer than kMaxEntries in all.
+  void Layout(absl::Span<const uint32_t> lengths) {
+    lists_.resize(lengths.size());
+    uint64_t offset = 0;
+    for (size_t i = 0; i < lengths.size(); ++i) {
+      lists_[i].size_class = ClassFor(lengths[i]);
+      lists_[i].offset = offset;
+      offset += Capacity(lists_[i].size_class);
+    }
+    pool_.reserve(offset + offset / 16);
+    pool_.resize(offset);
+  }
+
+  /// Add() into a room made by Layout(), but IndexLongLists() must follow the last one.
+  void Append(Slot lower, UpperId upper) {
+    List& list = lists_[lower];
+    pool_[list.offset + list.length++] = upper;
+  }
+
+  void IndexLongLists() {
+    for (Slot lower = 0; lower < lists_.size(); ++lower) {
+      longest_ = std::max<uint32_t>(longest_, lists_[lower].length);
+      if (lists_[lower].length > kIndexedLength) IndexFrom(lower, 0);
     }
   }
 
@@ -151,8 +179,12 @@ class IncidenceLists {
 
   /// The last entry was appended to a list that is now long: index it, or all when it just became long.
   void IndexAdded(Slot lower) {
+    const uint32_t length = Length(lower);
+    IndexFrom(lower, length == kIndexedLength + 1 ? 0 : length - 1);
+  }
+
+  void IndexFrom(Slot lower, uint32_t first) {
     const auto entries = Of(lower);
-    const uint32_t first = entries.size() == kIndexedLength + 1 ? 0 : entries.size() - 1;
     for (uint32_t i = first; i < entries.size(); ++i) positions_[Key(lower, entries[i])].push_back(i);
   }
 

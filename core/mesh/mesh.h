@@ -211,6 +211,7 @@ class Mesh {
   size_t memory_bytes() const;
 
  private:
+  friend class BulkBuilder;
   friend class MeshValidator;
   friend class MeshTestPeer;
 

@@ -40,6 +40,14 @@ class Slots {
     return {slot, born_before};
   }
 
+  /// Allocates slots 0 to count - 1. REQUIRES: none was ever used.
+  void AllocateFirst(Slot count, Stamp born) {
+    live_.Fill(count);
+    born_.reserve(count + count / 16);
+    born_.assign(count, born);
+    limit_ = count;
+  }
+
   /// Whether Allocate() can be called `count` times without the limit passing `max_slots`.
   bool CanAllocate(uint32_t count, uint32_t max_slots) const {
     return limit_ <= max_slots && free_.size() + (max_slots - limit_) >= count;

@@ -34,6 +34,13 @@ class StampColumn {
     page_max_[page] = std::max(page_max_[page], stamp);
   }
 
+  /// Touches slots 0 to count - 1. REQUIRES: none was ever touched.
+  void TouchFirst(Slot count, Stamp stamp) {
+    stamps_.reserve(count + count / 16);
+    stamps_.assign(count, stamp);
+    page_max_.assign((size_t{count} + kPageSlots - 1) / kPageSlots, stamp);
+  }
+
   /// Puts back an older stamp. The page's maximum stays, which costs a later scan but never an answer.
   void Restore(Slot slot, Stamp stamp) {
     if (slot < stamps_.size()) stamps_[slot] = stamp;

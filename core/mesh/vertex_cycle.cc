@@ -17,7 +17,8 @@ absl::optional<FaceCode> MatchFace(absl::Span<const VertexId> stored, absl::Span
   return absl::nullopt;
 }
 
-CycleKey CanonicalCycle(absl::Span<const VertexId> cycle) {
+/// The smallest of all rotations and reflections, by trying them.
+static CycleKey SmallestCycle(absl::Span<const VertexId> cycle) {
   const int n = cycle.size();
   CycleKey best;
   best.fill(VertexId());
@@ -30,6 +31,18 @@ CycleKey CanonicalCycle(absl::Span<const VertexId> cycle) {
     best = std::min(best, candidate);
   }
   return best;
+}
+
+CycleKey CanonicalCycle(absl::Span<const VertexId> cycle) {
+  const int n = cycle.size();
+  const int low = std::min_element(cycle.begin(), cycle.end()) - cycle.begin();
+  if (std::count(cycle.begin(), cycle.end(), cycle[low]) > 1) return SmallestCycle(cycle);
+  const VertexId next = cycle[low + 1 == n ? 0 : low + 1];
+  const VertexId previous = cycle[low == 0 ? n - 1 : low - 1];
+  CycleKey key;
+  key.fill(VertexId());
+  for (int k = 0; k < n; ++k) key[k] = cycle[(low + (next <= previous ? k : n - k)) % n];
+  return key;
 }
 
 }  // namespace dynmesh
