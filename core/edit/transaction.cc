@@ -1,12 +1,18 @@
 #include "core/edit/transaction.h"
 
+#include <algorithm>
+#include <cmath>
 #include <new>
 #include <string>
 
 #include "absl/strings/str_cat.h"
+#include "core/mesh/spatial_order.h"
 
 namespace dynmesh {
 namespace {
+
+/// Fewer new vertices of one edit take slots in the order they came, more along a Hilbert curve.
+constexpr size_t kFewVertices = 32;
 
 absl::Status BadLength(absl::string_view what, size_t expected, size_t actual) {
   return InvalidArgument(reason::kBadArrayLength,
@@ -20,12 +26,17 @@ class BatchApplier {
       : mesh_(mesh), as_of_(std::min(options.as_of_revision, mesh.revision())), result_(result) {}
 
   absl::Status operator()(const AddVerticesEdit& edit) {
-    return ForEach(edit.positions.size(), [&](size_t i) -> absl::Status {
-      DYNMESH_ASSIGN_OR_RETURN(const VertexId v, mesh_.AddVertex(edit.positions[i]));
-      new_vertices_.push_back(v);
-      AddNewSlot(v.slot());
+    const size_t count = edit.positions.size();
+    const Permutation order = count < kFewVertices ? Permutation() : FiniteOrder(edit.positions);
+    std::vector<VertexId> added(count);
+    DYNMESH_RETURN_IF_ERROR(ForEach(count, [&](size_t k) -> absl::Status {
+      const size_t i = order.empty() ? k : order[k];
+      DYNMESH_ASSIGN_OR_RETURN(added[i], mesh_.AddVertex(edit.positions[i]));
       return absl::OkStatus();
-    });
+    }));
+    for (VertexId v : added) AddNewSlot(v.slot());
+    new_vertices_.insert(new_vertices_.end(), added.begin(), added.end());
+    return absl::OkStatus();
   }
 
   absl::Status operator()(const RemoveVerticesEdit& edit) {
@@ -56,18 +67,17 @@ class BatchApplier {
                              absl::StrCat(edit.vertices.size(), " vertex ids are no whole number of ",
                                           ElementTypeName(edit.type), " elements"));
     }
-    return ForEach(edit.vertices.size() / size, [&](size_t i) {
-      return AddElement(edit.type, absl::MakeConstSpan(edit.vertices).subspan(i * size, size));
-    });
+    std::vector<VertexId> vertices(edit.vertices.size());
+    DYNMESH_RETURN_IF_ERROR(ForEach(vertices.size() / size, [&](size_t i) { return ResolveAll(edit, i, vertices); }));
+    return AddElements(edit.type, vertices);
   }
 
   absl::Status operator()(const RemoveElementsEdit& edit) {
     if (!IsEntityKind(edit.kind)) return BadKind(edit.kind);
-    return ForEach(edit.elements.size(), [&](size_t i) -> absl::Status {
-      const EntityId id(edit.kind, edit.elements[i]);
-      DYNMESH_RETURN_IF_ERROR(CheckElement(id));
-      return mesh_.RemoveElement(id);
-    });
+    DYNMESH_RETURN_IF_ERROR(ForEach(edit.elements.size(), [&](size_t i) {
+      return CheckElement({edit.kind, edit.elements[i]});
+    }));
+    return mesh_.RemoveElements(edit.kind, edit.elements);
   }
 
   absl::Status operator()(const AddAttributeEdit& edit) { return mesh_.AddAttribute(edit.spec); }
@@ -133,18 +143,39 @@ class BatchApplier {
     return EntityId(kind, slot);
   }
 
-  absl::Status AddElement(ElementType type, absl::Span<const Slot> slots) {
-    std::array<VertexId, kMaxElementVertices> vertices;
-    for (size_t k = 0; k < slots.size(); ++k) {
-      DYNMESH_ASSIGN_OR_RETURN(vertices[k], Resolve(slots[k]));
+  /// Resolves the vertices of the i-th element.
+  absl::Status ResolveAll(const AddElementsEdit& edit, size_t i, std::vector<VertexId>& vertices) const {
+    const size_t size = NumVertices(edit.type);
+    for (size_t k = i * size; k < (i + 1) * size; ++k) {
+      DYNMESH_ASSIGN_OR_RETURN(vertices[k], Resolve(edit.vertices[k]));
     }
-    DYNMESH_ASSIGN_OR_RETURN(const EntityId id,
-                             mesh_.AddElement(type, absl::MakeConstSpan(vertices.data(), slots.size())));
-    AddNewSlot(id.slot);
-    if (mesh_.IsDegenerate(id)) result_.degenerate.push_back(id);
-    const bool twin = id.kind == EntityKind::kCell && mesh_.FindTwin(CellId(id.slot)).valid();
-    if (twin || mesh_.IsDuplicate(id)) result_.duplicate.push_back(id);
     return absl::OkStatus();
+  }
+
+  absl::Status AddElements(ElementType type, absl::Span<const VertexId> vertices) {
+    struct Added {
+      EntityId id;
+      bool duplicate;
+    };
+    std::vector<Added> added(vertices.size() / NumVertices(type));
+    DYNMESH_RETURN_IF_ERROR(mesh_.AddElements(type, vertices, [&](size_t i, EntityId id) {
+      const bool twin = id.kind == EntityKind::kCell && mesh_.FindTwin(CellId(id.slot)).valid();
+      added[i] = {id, twin || mesh_.IsDuplicate(id)};
+    }));
+    for (const auto& [id, duplicate] : added) {
+      AddNewSlot(id.slot);
+      if (mesh_.IsDegenerate(id)) result_.degenerate.push_back(id);
+      if (duplicate) result_.duplicate.push_back(id);
+    }
+    return absl::OkStatus();
+  }
+
+  /// Hilbert order, or none when a position is not finite and so will be refused.
+  static Permutation FiniteOrder(absl::Span<const Point> positions) {
+    const bool finite = std::all_of(positions.begin(), positions.end(), [](const Point& p) {
+      return std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]);
+    });
+    return finite ? HilbertOrder(positions) : Permutation();
   }
 
   static absl::Status UnknownAttribute(const AttributeSpec& spec) {

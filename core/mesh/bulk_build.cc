@@ -222,7 +222,7 @@ void BulkBuilder::MarkBoundary() {
     if (uses[0].valid() && !uses[1].valid()) mesh_.SetFaceOnBoundary(FaceId(f), +1);
   }
   for (Slot e = 0; e < num_edges; ++e) {
-    if (num_edge_faces_[e] == 1) mesh_.SetEdgeOnBoundary(EdgeId(e), +1);
+    if (num_edge_faces_[e] == 1) mesh_.CountBoundary(EdgeId(e), +1);
   }
 }
 
@@ -277,13 +277,6 @@ absl::Status BulkBuilder::ReportElements() {
 }
 
 bool BulkBuilder::HasLowerTwin(CellId c) const {
-  const auto faces = mesh_.Faces(c);
-  const auto& first = mesh_.face_cells_[faces[0].face().slot()];
-  const auto& second = mesh_.face_cells_[faces[1].face().slot()];
-  // Where two faces have no other cell in common, as nearly always, there is none for all.
-  const auto other = [c](const auto& uses) { return uses[0] == c ? uses[1] : uses[0]; };
-  const bool inline_uses = first[1] != Mesh::kOverflow && second[1] != Mesh::kOverflow;
-  if (inline_uses && (!other(first).valid() || other(first) != other(second))) return false;
   const CellId twin = mesh_.FindTwin(c);
   return twin.valid() && twin < c;
 }

@@ -1,6 +1,5 @@
 #include "core/mesh/element_type.h"
 
-#include <cassert>
 #include <initializer_list>
 
 namespace dynmesh {
@@ -70,7 +69,9 @@ constexpr ElementTemplate Build(const Outline& outline) {
   return t;
 }
 
-constexpr ElementTemplate kTemplates[] = {
+}  // namespace
+
+constexpr ElementTemplate internal::kElementTemplates[] = {
     ElementTemplate{},
     Build({ElementType::kWireEdge, "wire_edge", {{0, 1}}, {}, {}, {0}}),
     Build({ElementType::kTriangle, "triangle", {{0, 1}, {1, 2}, {2, 0}}, {{0, 1, 2}}, {0}, {0, 1}}),
@@ -100,6 +101,8 @@ constexpr ElementTemplate kTemplates[] = {
            {0, 5, 10},
            {0, 2, 5, 7}}),
 };
+
+namespace {
 
 constexpr bool FacesUseCellEdges(const ElementTemplate& t) {
   for (int f = 0; f < t.num_faces; ++f) {
@@ -170,7 +173,7 @@ constexpr bool IsSmallest(const ElementTemplate& t, unsigned chosen, int size,
 }
 
 constexpr bool Consistent(ElementType type) {
-  const ElementTemplate& t = kTemplates[static_cast<int>(type)];
+  const ElementTemplate& t = internal::kElementTemplates[static_cast<int>(type)];
   return t.type == type && FacesUseCellEdges(t) && ClosedAndOriented(t) &&
          IsSmallest(t, BitSet(t.smart_edges, t.num_smart_edges), t.num_edges, HitsFaces) &&
          IsSmallest(t, BitSet(t.smart_vertices, t.num_smart_vertices), t.num_vertices, Covers);
@@ -185,11 +188,6 @@ static_assert(Consistent(ElementType::kPrism));
 static_assert(Consistent(ElementType::kHexahedron));
 
 }  // namespace
-
-const ElementTemplate& TemplateOf(ElementType type) {
-  assert(IsElementType(static_cast<int>(type)));
-  return kTemplates[static_cast<int>(type)];
-}
 
 absl::string_view ElementTypeName(ElementType type) {
   return IsElementType(static_cast<int>(type)) ? TemplateOf(type).name : absl::string_view("unspecified");

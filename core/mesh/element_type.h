@@ -1,6 +1,7 @@
 #ifndef DYNMESH_CORE_MESH_ELEMENT_TYPE_H_
 #define DYNMESH_CORE_MESH_ELEMENT_TYPE_H_
 
+#include <cassert>
 #include <cstdint>
 
 #include "absl/strings/string_view.h"
@@ -73,8 +74,15 @@ struct ElementTemplate {
   uint8_t smart_edge_of_face[kMaxElementFaces];
 };
 
+namespace internal {
+extern const ElementTemplate kElementTemplates[kNumElementTypes + 1];
+}
+
 /// REQUIRES: IsElementType(type).
-const ElementTemplate& TemplateOf(ElementType type);
+inline const ElementTemplate& TemplateOf(ElementType type) {
+  assert(IsElementType(static_cast<int>(type)));
+  return internal::kElementTemplates[static_cast<int>(type)];
+}
 
 constexpr EntityKind KindOf(ElementType type) {
   return type == ElementType::kWireEdge                                  ? EntityKind::kEdge

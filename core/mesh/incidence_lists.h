@@ -43,10 +43,11 @@ class IncidenceLists {
   /// Whether `count` entries more have room within the 32-bit limits, whatever list they go to.
   bool HasRoom(uint32_t count) const { return longest_ + count <= kMaxLength && pool_.size() < kMaxPool; }
 
-  void Add(Slot lower, UpperId upper) {
+  /// `first_room`: room that an empty list is given, 1-8; what most lists will need saves them moves.
+  void Add(Slot lower, UpperId upper, uint32_t first_room = 2) {
     if (lower >= lists_.size()) lists_.resize(lower + 1);
     const uint32_t size_class = lists_[lower].size_class;
-    if (lists_[lower].length == Capacity(size_class)) Move(lower, NextClass(size_class));
+    if (lists_[lower].length == Capacity(size_class)) Move(lower, size_class == 0 ? first_room : NextClass(size_class));
     List& list = lists_[lower];
     pool_[list.offset + list.length++] = upper;
     longest_ = std::max<uint32_t>(longest_, list.length);

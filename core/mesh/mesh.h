@@ -10,6 +10,7 @@
 
 #include "absl/container/btree_set.h"
 #include "absl/container/flat_hash_map.h"
+#include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
@@ -180,6 +181,15 @@ class Mesh {
   /// Errors: FAILED_PRECONDITION NOT_AN_ELEMENT.
   absl::Status RemoveElement(EntityId id);
 
+  /// AddElement for NumVertices(type) ids an element, in spatial order when there are many, so that new slots are
+  /// handed out along a Hilbert curve; equal elements keep their order. Calls added(i, id) after each.
+  /// Errors: those of AddElement, with metadata index. REQUIRES: a batch is open, and is rolled back after an error.
+  absl::Status AddElements(ElementType type, absl::Span<const VertexId> vertices,
+                           absl::FunctionRef<void(size_t, EntityId)> added);
+  /// RemoveElement for each of `elements`, in ascending order; none may be named twice.
+  /// Errors: those of RemoveElement, with metadata index; nothing was changed then.
+  absl::Status RemoveElements(EntityKind kind, absl::Span<const Slot> elements);
+
   // ---- Attributes ----
 
   const std::vector<AttributeColumn>& attributes() const { return attributes_; }
@@ -243,6 +253,9 @@ class Mesh {
   // mesh_edits.cc: checks, and the hierarchical creation behind the public edits
   absl::Status CheckVertices(ElementType type, VertexSpan vertices) const;
   absl::Status CheckRoom(ElementType type) const;
+  absl::Status CheckRemovable(EntityId id) const;
+  void Remove(EntityId id);
+  absl::StatusOr<EntityId> AddChecked(ElementType type, VertexSpan vertices);
   absl::StatusOr<EntityId> AddWireEdge(VertexSpan vertices);
   absl::StatusOr<EntityId> AddFaceElement(VertexSpan vertices);
   absl::StatusOr<EntityId> AddCell(ElementType type, VertexSpan vertices);
@@ -257,6 +270,10 @@ class Mesh {
                          CellParts& parts) const;
   EdgeId EnsureEdge(VertexId a, VertexId b);
   void EnsureCellParts(const ElementTemplate& shape, VertexSpan vertices, CellParts& parts);
+
+  // mesh_batches.cc
+  std::vector<uint32_t> OrderOfElements(absl::Span<const VertexId> vertices, size_t size) const;
+  absl::Status RemoveAscending(EntityKind kind, absl::Span<const Slot> sorted, absl::Span<const Slot> elements);
 
   // mesh_links.cc: creating and destroying single entities with their links, counters and journal
   EdgeId CreateEdge(VertexId a, VertexId b, uint8_t extra_flags);
@@ -288,8 +305,7 @@ class Mesh {
   void AddEdgeFace(EdgeId e, FaceId f);
   void RemoveEdgeFace(EdgeId e, FaceId f);
   void SetFaceOnBoundary(FaceId f, int change);
-  void SetEdgeOnBoundary(EdgeId e, int change);
-  void CountBoundary(EntityId id, int change);
+  void CountBoundary(EdgeId e, int change);
 
   void SetElementFlag(EntityId id);
   void ClearElementFlag(EntityId id);
@@ -356,7 +372,9 @@ class Mesh {
   absl::flat_hash_map<CycleKey, FaceId> hub_faces_;
 
   std::array<BitSet, kNumEntityKinds> boundary_;
-  std::array<std::vector<uint32_t>, kNumEntityKinds> boundary_uses_;  ///< of vertices and edges
+  /// Of an edge: its faces on the boundary, and one more if it has exactly one face. Of a vertex: ends of its edges
+  /// on the boundary.
+  std::array<std::vector<uint32_t>, 2> boundary_uses_;
 
   std::vector<AttributeColumn> attributes_;
   Checksum checksum_;

@@ -22,6 +22,11 @@ struct FaceVertices {
   std::array<VertexId, kMaxFaceVertices> vertices;
 };
 
+Slot XorOf(const VertexId* vertices, size_t size) {
+  const Slot first_three = vertices[0].slot() ^ vertices[1].slot() ^ vertices[2].slot();
+  return size == 4 ? first_three ^ vertices[3].slot() : first_three;
+}
+
 }  // namespace
 
 struct Mesh::CellParts {
@@ -33,6 +38,10 @@ struct Mesh::CellParts {
 
 absl::StatusOr<EntityId> Mesh::AddElement(ElementType type, absl::Span<const VertexId> vertices) {
   DYNMESH_RETURN_IF_ERROR(CheckVertices(type, vertices));
+  return AddChecked(type, vertices);
+}
+
+absl::StatusOr<EntityId> Mesh::AddChecked(ElementType type, VertexSpan vertices) {
   DYNMESH_RETURN_IF_ERROR(CheckRoom(type));
   switch (KindOf(type)) {
     case EntityKind::kEdge:
@@ -118,12 +127,16 @@ EdgeId Mesh::LeastUsed(absl::Span<const EdgeId> edges) const {
 }
 
 Mesh::FaceMatch Mesh::FindFaceAround(EdgeId e, VertexSpan vertices) const {
+  if (vertices.size() > static_cast<size_t>(face_stride_)) return {};  // there are no quads
   if (edge_faces_.Length(e.slot()) > kHubDegree) {
     const auto it = hub_faces_.find(CanonicalCycle(vertices));
     return it == hub_faces_.end() ? FaceMatch() : FaceMatch{it->second, *MatchFace(Vertices(it->second), vertices)};
   }
+  // Equal cycles have equal exclusive-ors: few others pass.
+  const Slot sieve = XorOf(vertices.data(), vertices.size());
   for (FaceId f : IncidentFaces(e)) {
-    if (IsDuplicate(f)) continue;
+    const VertexId* stored = &face_vertices_[size_t{f.slot()} * face_stride_];
+    if (XorOf(stored, vertices.size()) != sieve || IsDuplicate(f)) continue;
     if (const auto code = MatchFace(Vertices(f), vertices)) return {f, *code};
   }
   return {};
@@ -192,6 +205,12 @@ CellId Mesh::FindCellButNot(CellId c, ElementType type, const CellParts& parts) 
 
 CellId Mesh::FindTwin(CellId c) const {
   const auto faces = Faces(c);
+  // Nearly always two faces have no other cell in common, and then there is none for all.
+  const auto& first = face_cells_[faces[0].face().slot()];
+  const auto& second = face_cells_[faces[1].face().slot()];
+  const auto other = [c](const auto& uses) { return uses[0] == c ? uses[1] : uses[0]; };
+  const bool inline_uses = first[1] != kOverflow && second[1] != kOverflow;
+  if (inline_uses && (!other(first).valid() || other(first) != other(second))) return CellId();
   CellParts parts;
   for (size_t i = 0; i < faces.size(); ++i) parts.faces[i] = {faces[i].face(), faces[i].code()};
   return FindCellButNot(c, Type(c), parts);
@@ -284,6 +303,12 @@ void Mesh::EnsureCellParts(const ElementTemplate& shape, VertexSpan vertices, Ce
 // ---- Removal ----
 
 absl::Status Mesh::RemoveElement(EntityId id) {
+  DYNMESH_RETURN_IF_ERROR(CheckRemovable(id));
+  Remove(id);
+  return absl::OkStatus();
+}
+
+absl::Status Mesh::CheckRemovable(EntityId id) const {
   if (id.kind == EntityKind::kVertex) {
     return InvalidArgument(reason::kBadEntityKind, "vertices are not elements");
   }
@@ -294,17 +319,13 @@ absl::Status Mesh::RemoveElement(EntityId id) {
         absl::StrCat(EntityKindName(id.kind), " ", id.slot, " is derived: remove the elements that use it"),
         {{"kind", std::string(EntityKindName(id.kind))}, {"ids", absl::StrCat(id.slot)}});
   }
-  if (id.kind == EntityKind::kCell) {
-    DestroyCell(CellId(id.slot));
-    return absl::OkStatus();
-  }
-  ClearElementFlag(id);
-  if (id.kind == EntityKind::kFace) {
-    ReleaseFace(FaceId(id.slot));
-  } else {
-    ReleaseEdge(EdgeId(id.slot));
-  }
   return absl::OkStatus();
+}
+
+void Mesh::Remove(EntityId id) {
+  if (id.kind == EntityKind::kCell) return DestroyCell(CellId(id.slot));
+  ClearElementFlag(id);
+  id.kind == EntityKind::kFace ? ReleaseFace(FaceId(id.slot)) : ReleaseEdge(EdgeId(id.slot));
 }
 
 }  // namespace dynmesh

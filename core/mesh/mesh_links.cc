@@ -213,14 +213,14 @@ void Mesh::RemoveFaceCell(FaceId f, CellId c) {
 
 void Mesh::AddEdgeFace(EdgeId e, FaceId f) {
   const uint32_t before = edge_faces_.Length(e.slot());
-  edge_faces_.Add(e.slot(), f);
-  if (before < 2) SetEdgeOnBoundary(e, before == 0 ? +1 : -1);
+  edge_faces_.Add(e.slot(), f, NumLive(EntityKind::kCell) > 0 ? 4 : 2);  // solids: most edges have four and more
+  if (before < 2) CountBoundary(e, before == 0 ? +1 : -1);
 }
 
 void Mesh::RemoveEdgeFace(EdgeId e, FaceId f) {
   edge_faces_.Remove(e.slot(), f);
   const uint32_t after = edge_faces_.Length(e.slot());
-  if (after < 2) SetEdgeOnBoundary(e, after == 0 ? -1 : +1);
+  if (after < 2) CountBoundary(e, after == 0 ? -1 : +1);
 }
 
 // ---- Boundary ----
@@ -228,19 +228,18 @@ void Mesh::RemoveEdgeFace(EdgeId e, FaceId f) {
 void Mesh::SetFaceOnBoundary(FaceId f, int change) {
   boundary_[2].Assign(f.slot(), change > 0);
   for (EdgeId e : Edges(f)) CountBoundary(e, change);
-  for (VertexId v : Vertices(f)) CountBoundary(v, change);
 }
 
-void Mesh::SetEdgeOnBoundary(EdgeId e, int change) {
-  CountBoundary(e, change);
-  for (VertexId v : Vertices(e)) CountBoundary(v, change);
-}
-
-void Mesh::CountBoundary(EntityId id, int change) {
-  uint32_t& uses = boundary_uses_[Dimension(id.kind)][id.slot];
-  const uint32_t before = uses;
-  uses += change;
-  if ((before == 0) != (uses == 0)) boundary_[Dimension(id.kind)].Assign(id.slot, uses != 0);
+void Mesh::CountBoundary(EdgeId e, int change) {
+  const bool before = boundary_uses_[1][e.slot()] != 0;
+  const bool after = (boundary_uses_[1][e.slot()] += change) != 0;
+  if (before == after) return;
+  boundary_[1].Assign(e.slot(), after);
+  for (VertexId v : edge_vertices_[e.slot()]) {
+    uint32_t& uses = boundary_uses_[0][v.slot()];
+    uses += after ? 1 : -1;
+    boundary_[0].Assign(v.slot(), uses != 0);
+  }
 }
 
 // ---- Flags and order ----

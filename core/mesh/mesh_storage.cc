@@ -32,9 +32,9 @@ size_t Bytes(const std::vector<T>& rows) {
 }  // namespace
 
 Slot Mesh::NewSlot(EntityKind kind, JournalEntry& entry) {
-  const auto [slot, born_before] = mutable_slots(kind).Allocate(next_stamp());
+  const auto [slot, born_before, at_end] = mutable_slots(kind).Allocate(next_stamp());
   entry = {JournalOp::kCreate, kind, slot, born_before, changed(kind).At(slot)};
-  EnsureRow(kind, slot);
+  if (at_end) EnsureRow(kind, slot);
   return slot;
 }
 
@@ -122,7 +122,7 @@ std::vector<std::pair<std::string, size_t>> Mesh::MemoryByArray() const {
     arrays.emplace_back(name + " slots", slots_[k].memory_bytes());
     arrays.emplace_back(name + " changed", changed_[k].memory_bytes());
     arrays.emplace_back(name + " flags", Bytes(flags_[k]));
-    arrays.emplace_back(name + " boundary", boundary_[k].memory_bytes() + Bytes(boundary_uses_[k]));
+    arrays.emplace_back(name + " boundary", boundary_[k].memory_bytes() + (k < 2 ? Bytes(boundary_uses_[k]) : 0));
   }
   for (const AttributeColumn& column : attributes_) {
     arrays.emplace_back("attribute " + column.spec().name, column.memory_bytes());

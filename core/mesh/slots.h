@@ -22,12 +22,14 @@ class Slots {
   struct Allocation {
     Slot slot;
     Stamp born_before;  ///< birth of the occupant before, 0 for a slot that was never used
+    bool at_end;        ///< the slot lies at the end: arrays may have to grow
   };
 
   /// The lowest reusable slot, or a new one at the end.
   Allocation Allocate(Stamp born) {
     Slot slot = free_.empty() ? kNoSlot : free_.Next(first_free_hint_);
-    if (slot == kNoSlot) {
+    const bool at_end = slot == kNoSlot;
+    if (at_end) {
       slot = limit_++;
     } else {
       free_.Clear(slot);
@@ -37,7 +39,7 @@ class Slots {
     if (slot >= born_.size()) born_.resize(slot + 1);
     const Stamp born_before = born_[slot];
     born_[slot] = born;
-    return {slot, born_before};
+    return {slot, born_before, at_end};
   }
 
   /// Allocates slots 0 to count - 1. REQUIRES: none was ever used.

@@ -228,11 +228,10 @@ class MeshValidator {
       if (mesh_.IsOnBoundary(f) != expected) Report("face ", f.slot(), " has a wrong boundary bit");
       if (!expected) return;
       for (EdgeId e : mesh_.Edges(f)) ++of_edges[e.slot()];
-      for (VertexId v : mesh_.Vertices(f)) ++of_vertices[v.slot()];
     });
     ForEachLive<EdgeId>(EntityKind::kEdge, [&](EdgeId e) {
-      if (mesh_.IncidentFaces(e).size() != 1) return;
-      ++of_edges[e.slot()];
+      of_edges[e.slot()] += mesh_.IncidentFaces(e).size() == 1;
+      if (of_edges[e.slot()] == 0) return;
       for (VertexId v : mesh_.Vertices(e)) ++of_vertices[v.slot()];
     });
     CheckBoundaryUses(EntityKind::kVertex, of_vertices);

@@ -7,12 +7,14 @@ namespace dynmesh {
 absl::optional<FaceCode> MatchFace(absl::Span<const VertexId> stored, absl::Span<const VertexId> key) {
   const int n = stored.size();
   if (key.size() != stored.size()) return absl::nullopt;
-  for (int value = 0; value < 8; ++value) {
-    const FaceCode code{static_cast<uint8_t>(value)};
-    if (code.rotation() >= n || stored[code.rotation()] != key[0]) continue;
-    int k = 1;
-    while (k < n && stored[code.StoredVertex(k, n)] == key[k]) ++k;
-    if (k == n) return code;
+  for (const int flipped : {0, 4}) {
+    const int second = flipped ? n - 1 : 1;  // step from one vertex of the key to the next
+    for (int rotation = 0; rotation < n; ++rotation) {
+      if (stored[rotation] != key[0]) continue;
+      int k = 1, at = rotation;
+      while (k < n && stored[at = at + second < n ? at + second : at + second - n] == key[k]) ++k;
+      if (k == n) return FaceCode{static_cast<uint8_t>(rotation | flipped)};
+    }
   }
   return absl::nullopt;
 }
