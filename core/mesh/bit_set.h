@@ -72,6 +72,30 @@ class BitSet {
     }
   }
 
+  /// Writes the smallest members >= slot, at most `max_members` of them, to `out`; returns how many. The next call may
+  /// go on at the last one + 1. Cost: as Next, but a word at a time.
+  size_t Collect(Slot slot, Slot* out, size_t max_members) const {
+    size_t count = 0;
+    size_t word = slot / 64;
+    uint64_t bits = word < words_.size() ? words_[word] >> (slot % 64) << (slot % 64) : 0;
+    while (count < max_members) {
+      if (bits == 0) {
+        word = NextWord(word + 1);
+        if (word == kNone) break;
+        bits = words_[word];
+      }
+      const Slot base = word * 64;
+      if (bits == ~uint64_t{0} && count + 64 <= max_members) {
+        for (Slot i = 0; i < 64; ++i) out[count + i] = base + i;
+        count += 64;
+        bits = 0;
+        continue;
+      }
+      for (; bits != 0 && count < max_members; bits &= bits - 1) out[count++] = base + std::countr_zero(bits);
+    }
+    return count;
+  }
+
   uint32_t size() const { return count_; }
   bool empty() const { return count_ == 0; }
   size_t memory_bytes() const { return (words_.size() + summary_.size()) * sizeof(uint64_t); }

@@ -76,7 +76,10 @@ absl::Status BulkBuilder::AddElements(ElementType type, absl::Span<const VertexI
 
 void BulkBuilder::AppendElement(ElementType type, const VertexId* vertices) {
   const EntityKind kind = KindOf(type);
-  mesh_.flags_[Dimension(kind)].push_back(static_cast<uint8_t>(type) | Mesh::kElementFlag);
+  const bool degenerate = HasRepeats(absl::MakeConstSpan(vertices, NumVertices(type)));
+  mesh_.flags_[Dimension(kind)].push_back(static_cast<uint8_t>(type) | Mesh::kElementFlag |
+                                          (degenerate ? Mesh::kDegenerateFlag : 0));
+  mesh_.num_degenerate_ += degenerate;
   if (kind == EntityKind::kEdge) {
     mesh_.edge_vertices_.push_back({vertices[0], vertices[1]});
     return;
@@ -238,6 +241,9 @@ void BulkBuilder::IndexHubs() {
 
 void BulkBuilder::CountElements() {
   mesh_.flags_[1].resize(mesh_.edge_vertices_.size(), static_cast<uint8_t>(ElementType::kWireEdge));
+  for (Slot e = counts_[1]; e < mesh_.edge_vertices_.size(); ++e) {
+    if (mesh_.edge_vertices_[e][0] == mesh_.edge_vertices_[e][1]) mesh_.flags_[1][e] |= Mesh::kDegenerateFlag;
+  }
   const size_t counts[] = {counts_[0], mesh_.edge_vertices_.size(), mesh_.face_cells_.size(), counts_[3]};
   for (EntityKind kind : kEntityKinds) {
     const int k = Dimension(kind);

@@ -49,13 +49,6 @@ class CellFace {
   std::array<VertexId, kMaxFaceVertices> vertices_;
 };
 
-bool HasRepeats(absl::Span<const VertexId> vertices) {
-  for (size_t i = 1; i < vertices.size(); ++i) {
-    if (std::find(vertices.begin(), vertices.begin() + i, vertices[i]) != vertices.begin() + i) return true;
-  }
-  return false;
-}
-
 /// MatchFace for cycles that are known to be equal and name no vertex twice.
 FaceCode CodeOfEqual(absl::Span<const VertexId> stored, absl::Span<const VertexId> key) {
   const int n = stored.size();
@@ -190,6 +183,7 @@ void BulkBuilder::ScanCell(CellId c) {
       std::array<EdgeId, kMaxFaceVertices> edges;
       for (int k = 0; k < shape.faces[i].size; ++k) edges[k] = names[shape.faces[i].edges[k]];
       faces[i] = OrientedFace(NewFace(face.span(), {edges.data(), shape.faces[i].size}), FaceCode());
+      if (degenerate && HasRepeats(face.span())) mesh_.flags_[2].back() |= Mesh::kDegenerateFlag;
     } else if (first >= first_use) {  // two faces of a degenerate cell are one
       faces[i] = OrientFace(faces[first - first_use].face(), face.span(), degenerate);
     }

@@ -50,14 +50,6 @@ absl::Status Mesh::CheckLive(EntityId id, int64_t as_of_revision) const {
   return EntityNotFound(slots.Born(id.slot) == 0 ? reason::kUnknownEntity : reason::kEntityRemoved, id);
 }
 
-bool Mesh::IsDegenerate(EntityId id) const {
-  const auto vertices = VerticesOf(id);
-  for (size_t i = 0; i < vertices.size(); ++i) {
-    if (std::find(vertices.begin() + i + 1, vertices.end(), vertices[i]) != vertices.end()) return true;
-  }
-  return false;
-}
-
 absl::Span<const VertexId> Mesh::VerticesOf(EntityId id) const {
   switch (id.kind) {
     case EntityKind::kEdge:
@@ -74,12 +66,6 @@ EdgeId Mesh::Edge(CellId c, int local_edge) const {
   const OrientedFace oriented = Faces(c)[source.face];
   const auto edges = Edges(oriented.face());
   return edges[oriented.code().StoredEdge(source.edge, edges.size())];
-}
-
-absl::Span<const CellId> Mesh::IncidentCells(FaceId f) const {
-  const auto& uses = face_cells_[f.slot()];
-  if (uses[1] == kOverflow) return face_overflow_.Of(uses[0].slot());
-  return absl::MakeConstSpan(uses.data(), uses[1].valid() ? 2 : uses[0].valid() ? 1 : 0);
 }
 
 // ---- Vertices ----
@@ -182,6 +168,20 @@ void Mesh::ZeroAttributes(EntityId id) {
     if (std::all_of(row.begin(), row.end(), [](uint8_t byte) { return byte == 0; })) continue;
     WriteAttribute(column, id.slot, std::vector<uint8_t>(row.size()));
   }
+}
+
+// ---- Stored relations ----
+
+absl::Status Mesh::StoreRelation(Relation relation, bool on) {
+  if (StorableIndex(relation) == kNumStorableRelations) {
+    return InvalidArgument(reason::kBadArgument,
+                           absl::StrCat("the relation ", EntityKindName(relation.from), " -> ",
+                                        EntityKindName(relation.to), " cannot be switched"));
+  }
+  if (stored_.Has(relation) == on) return absl::OkStatus();
+  if (on) return stored_.Build(*this, relation);
+  stored_.Drop(relation);
+  return absl::OkStatus();
 }
 
 // ---- Batches ----

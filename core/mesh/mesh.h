@@ -25,6 +25,7 @@
 #include "core/mesh/journal.h"
 #include "core/mesh/slots.h"
 #include "core/mesh/stamps.h"
+#include "core/mesh/stored_relations.h"
 #include "core/mesh/vertex_cycle.h"
 
 namespace dynmesh {
@@ -118,7 +119,9 @@ class Mesh {
   /// A kept element that stands where another element of the same vertices stood already. Cells never are.
   bool IsDuplicate(EntityId id) const { return id.kind != EntityKind::kVertex && flags(id) & kDuplicateFlag; }
   /// An element that names a vertex twice.
-  bool IsDegenerate(EntityId id) const;
+  bool IsDegenerate(EntityId id) const { return id.kind != EntityKind::kVertex && flags(id) & kDegenerateFlag; }
+  /// Whether no element is degenerate.
+  bool IsPlain() const { return num_degenerate_ == 0; }
 
   absl::Span<const VertexId> Vertices(EdgeId e) const { return edge_vertices_[e.slot()]; }
   absl::Span<const VertexId> Vertices(FaceId f) const {
@@ -147,7 +150,11 @@ class Mesh {
   absl::Span<const EdgeId> IncidentEdges(VertexId v) const { return vertex_edges_.Of(v.slot()); }
   absl::Span<const FaceId> IncidentFaces(EdgeId e) const { return edge_faces_.Of(e.slot()); }
   /// Valid until the next edit.
-  absl::Span<const CellId> IncidentCells(FaceId f) const;
+  absl::Span<const CellId> IncidentCells(FaceId f) const {
+    const auto& uses = face_cells_[f.slot()];
+    if (uses[1] == kOverflow) return face_overflow_.Of(uses[0].slot());
+    return absl::MakeConstSpan(uses.data(), uses[1].valid() ? 2 : uses[0].valid() ? 1 : 0);
+  }
 
   /// The edge (not a duplicate) between two vertices in either direction, or an invalid id.
   /// Cost: the smaller of the two vertices' degrees.
@@ -201,6 +208,14 @@ class Mesh {
   /// REQUIRES: 0 <= column < attributes().size().
   absl::Status SetAttribute(int column, Slot slot, absl::Span<const uint8_t> row);
 
+  // ---- Stored relations ----
+
+  const StoredRelations& stored() const { return stored_; }
+  /// Keeps a table of the relation current from now on, or forgets it. Answers are the same either way.
+  /// Errors: INVALID_ARGUMENT BAD_ARGUMENT unless it is one of kStorableRelations; RESOURCE_EXHAUSTED.
+  /// Cost: to switch on, all rows.
+  absl::Status StoreRelation(Relation relation, bool on);
+
   // ---- Batches ----
 
   /// Starts the journal. REQUIRES: no edit since the last Commit, no batch open.
@@ -223,11 +238,13 @@ class Mesh {
  private:
   friend class BulkBuilder;
   friend class MeshValidator;
+  friend class RowKernels;
   friend class MeshTestPeer;
 
   static constexpr uint8_t kTypeMask = 7;
   static constexpr uint8_t kElementFlag = 8;
   static constexpr uint8_t kDuplicateFlag = 16;
+  static constexpr uint8_t kDegenerateFlag = 32;
   static constexpr CellId kOverflow{kNoSlot - 1};
   /// Vertices of more edges find them through hub_edges_, edges of more faces through hub_faces_.
   static constexpr uint32_t kHubDegree = 512;
@@ -245,7 +262,7 @@ class Mesh {
 
   uint8_t& flags(EntityId id) { return flags_[Dimension(id.kind)][id.slot]; }
   uint8_t flags(EntityId id) const { return flags_[Dimension(id.kind)][id.slot]; }
-  int FaceSize(FaceId f) const { return Type(f) == ElementType::kQuad ? 4 : 3; }
+  int FaceSize(FaceId f) const { return face_stride_ == kMaxFaceVertices && Type(f) == ElementType::kQuad ? 4 : 3; }
   Stamp next_stamp() const { return static_cast<Stamp>(revision_ + 1); }
   bool journaling() const { return batch_open_; }
   Slots& mutable_slots(EntityKind kind) { return slots_[Dimension(kind)]; }
@@ -293,6 +310,7 @@ class Mesh {
   void IndexHubFaces(EdgeId e);
   void IndexHubFace(FaceId f);
   void ForgetHubFace(FaceId f);
+  bool IsLastBetweenEnds(EdgeId e) const;
   void LinkEdge(EdgeId e);
   void UnlinkEdge(EdgeId e);
   void LinkFace(FaceId f);
@@ -344,8 +362,9 @@ class Mesh {
   int64_t revision_ = 0;
   std::array<Slots, kNumEntityKinds> slots_;
   std::array<StampColumn, kNumEntityKinds> changed_;
-  std::array<std::vector<uint8_t>, kNumEntityKinds> flags_;  ///< type | element | duplicate; none for vertices
+  std::array<std::vector<uint8_t>, kNumEntityKinds> flags_;  ///< type | element | duplicate | degenerate; none for vertices
   std::array<uint32_t, kNumEntityKinds> num_elements_ = {};
+  uint32_t num_degenerate_ = 0;  ///< elements
   /// Slots of duplicate edges and faces, by their vertices.
   std::array<absl::flat_hash_map<CycleKey, absl::btree_set<Slot>>, kNumEntityKinds> duplicates_;
 
@@ -370,6 +389,8 @@ class Mesh {
   absl::flat_hash_map<std::pair<VertexId, VertexId>, EdgeId> hub_edges_;
   /// Primary faces all of whose edges have very many, by CanonicalCycle.
   absl::flat_hash_map<CycleKey, FaceId> hub_faces_;
+
+  StoredRelations stored_;
 
   std::array<BitSet, kNumEntityKinds> boundary_;
   /// Of an edge: its faces on the boundary, and one more if it has exactly one face. Of a vertex: ends of its edges

@@ -78,7 +78,7 @@ absl::Status Mesh::CheckRoom(ElementType type) const {
     }
   }
   if (!vertex_edges_.HasRoom(kMaxElementEdges) || !edge_faces_.HasRoom(kMaxElementEdges) ||
-      !face_overflow_.HasRoom(kMaxElementFaces)) {
+      !face_overflow_.HasRoom(kMaxElementFaces) || !stored_.HasRoom(kMaxElementFaces * 2 * StoredRows::kMaxRow)) {
     return LimitExceeded("max_incident_entities", IncidenceLists<EdgeId>::kMaxLength,
                          uint64_t{IncidenceLists<EdgeId>::kMaxLength} + 1);
   }
@@ -270,14 +270,6 @@ absl::StatusOr<EntityId> Mesh::AddCell(ElementType type, VertexSpan vertices) {
   for (int i = 0; i < shape.num_faces; ++i) faces[i] = OrientedFace(parts.faces[i].face, parts.faces[i].code);
   WidenCells(shape.num_vertices, shape.num_faces);
   return CreateCell(type, vertices, absl::MakeConstSpan(faces.data(), shape.num_faces));
-}
-
-/// Whether a vertex is named twice.
-static bool HasRepeats(absl::Span<const VertexId> vertices) {
-  for (auto it = vertices.begin(); it != vertices.end(); ++it) {
-    if (std::find(it + 1, vertices.end(), *it) != vertices.end()) return true;
-  }
-  return false;
 }
 
 void Mesh::EnsureCellParts(const ElementTemplate& shape, VertexSpan vertices, CellParts& parts) {

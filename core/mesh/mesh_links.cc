@@ -13,7 +13,7 @@ EdgeId Mesh::CreateEdge(VertexId a, VertexId b, uint8_t extra_flags) {
   JournalEntry entry;
   const EdgeId e(NewSlot(EntityKind::kEdge, entry));
   edge_vertices_[e.slot()] = {a, b};
-  flags(e) = static_cast<uint8_t>(ElementType::kWireEdge) | extra_flags;
+  flags(e) = static_cast<uint8_t>(ElementType::kWireEdge) | extra_flags | (a == b ? kDegenerateFlag : 0);
   if (IsDuplicate(e)) CountDuplicate(e, +1);
   LinkEdge(e);
   if (IsElement(e)) CountElement(e, +1);
@@ -28,7 +28,7 @@ FaceId Mesh::CreateFace(VertexSpan vertices, absl::Span<const EdgeId> edges, uin
   std::copy(vertices.begin(), vertices.end(), face_vertices_.begin() + row);
   std::copy(edges.begin(), edges.end(), face_edges_.begin() + row);
   const ElementType type = vertices.size() == 4 ? ElementType::kQuad : ElementType::kTriangle;
-  flags(f) = static_cast<uint8_t>(type) | extra_flags;
+  flags(f) = static_cast<uint8_t>(type) | extra_flags | (HasRepeats(vertices) ? kDegenerateFlag : 0);
   if (IsDuplicate(f)) CountDuplicate(f, +1);
   LinkFace(f);
   if (IsElement(f)) CountElement(f, +1);
@@ -41,7 +41,7 @@ CellId Mesh::CreateCell(ElementType type, VertexSpan vertices, absl::Span<const 
   const CellId c(NewSlot(EntityKind::kCell, entry));
   std::copy(vertices.begin(), vertices.end(), cell_vertices_.begin() + size_t{c.slot()} * cell_vertex_stride_);
   std::copy(faces.begin(), faces.end(), cell_faces_.begin() + size_t{c.slot()} * cell_face_stride_);
-  flags(c) = static_cast<uint8_t>(type) | kElementFlag;
+  flags(c) = static_cast<uint8_t>(type) | kElementFlag | (HasRepeats(vertices) ? kDegenerateFlag : 0);
   LinkCell(c);
   CountElement(c, +1);
   Record(entry);
@@ -103,9 +103,16 @@ void Mesh::LinkEdge(EdgeId e) {
     if (vertex_edges_.Length(v.slot()) == kHubDegree + 1) IndexHubEdges(v);
   }
   IndexHubEdge(e);
+  if (stored_.any()) stored_.EdgeLinked(*this, e);
+}
+
+bool Mesh::IsLastBetweenEnds(EdgeId e) const {
+  const auto& duplicates = duplicates_[1];
+  return !IsDuplicate(e) && (duplicates.empty() || duplicates.count(CanonicalCycle(Vertices(e))) == 0);
 }
 
 void Mesh::UnlinkEdge(EdgeId e) {
+  if (stored_.any()) stored_.EdgeUnlinking(*this, e, IsLastBetweenEnds(e));
   ForgetHubEdge(e);
   for (VertexId v : Vertices(e)) vertex_edges_.Remove(v.slot(), e);
 }
@@ -134,6 +141,7 @@ void Mesh::LinkFace(FaceId f) {
     if (edge_faces_.Length(e.slot()) == kHubDegree + 1) IndexHubFaces(e);
   }
   IndexHubFace(f);
+  if (stored_.any()) stored_.FaceLinked(*this, f);
 }
 
 void Mesh::IndexHubFaces(EdgeId e) {
@@ -154,15 +162,18 @@ void Mesh::ForgetHubFace(FaceId f) {
 }
 
 void Mesh::UnlinkFace(FaceId f) {
+  if (stored_.any()) stored_.FaceUnlinking(*this, f);
   ForgetHubFace(f);
   for (EdgeId e : Edges(f)) RemoveEdgeFace(e, f);
 }
 
 void Mesh::LinkCell(CellId c) {
   for (OrientedFace oriented : Faces(c)) AddFaceCell(oriented.face(), c);
+  if (stored_.any()) stored_.CellLinked(*this, c);
 }
 
 void Mesh::UnlinkCell(CellId c) {
+  if (stored_.any()) stored_.CellUnlinking(*this, c);
   for (OrientedFace oriented : Faces(c)) RemoveFaceCell(oriented.face(), c);
 }
 
@@ -250,6 +261,7 @@ uint64_t Mesh::ElementTerm(EntityId id) const {
 
 void Mesh::CountElement(EntityId id, int change) {
   num_elements_[Dimension(id.kind)] += change;
+  if (flags(id) & kDegenerateFlag) num_degenerate_ += change;
   checksum_.topology += change > 0 ? ElementTerm(id) : -ElementTerm(id);
   Touch(id);
 }

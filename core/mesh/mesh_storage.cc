@@ -35,6 +35,7 @@ Slot Mesh::NewSlot(EntityKind kind, JournalEntry& entry) {
   const auto [slot, born_before, at_end] = mutable_slots(kind).Allocate(next_stamp());
   entry = {JournalOp::kCreate, kind, slot, born_before, changed(kind).At(slot)};
   if (at_end) EnsureRow(kind, slot);
+  if (stored_.any()) stored_.Begin({kind, slot});
   return slot;
 }
 
@@ -123,6 +124,10 @@ std::vector<std::pair<std::string, size_t>> Mesh::MemoryByArray() const {
     arrays.emplace_back(name + " changed", changed_[k].memory_bytes());
     arrays.emplace_back(name + " flags", Bytes(flags_[k]));
     arrays.emplace_back(name + " boundary", boundary_[k].memory_bytes() + (k < 2 ? Bytes(boundary_uses_[k]) : 0));
+  }
+  for (Relation relation : kStorableRelations) {
+    arrays.emplace_back(absl::StrCat(EntityKindName(relation.from), "->", EntityKindName(relation.to), " stored"),
+                        stored_.memory_bytes(relation));
   }
   for (const AttributeColumn& column : attributes_) {
     arrays.emplace_back("attribute " + column.spec().name, column.memory_bytes());

@@ -1,11 +1,15 @@
 #ifndef DYNMESH_CORE_MESH_RELATIONS_H_
 #define DYNMESH_CORE_MESH_RELATIONS_H_
 
+#include <algorithm>
+#include <array>
 #include <cstdint>
 #include <vector>
 
 #include "absl/types/span.h"
+#include "core/mesh/inverse_rows.h"
 #include "core/mesh/mesh.h"
+#include "core/mesh/row_block.h"
 
 /// The 16 neighbour relations V/E/F/C -> V/E/F/C (paper, section 4).
 ///
@@ -13,12 +17,9 @@
 /// vertex, edge or face, so degenerate elements repeat. Otherwise *incident* (lower to higher) or *adjacent*
 /// (same dimension) entities, ascending, each once, never the entity itself. Adjacent: vertices through an
 /// edge, edges through a vertex, faces through an edge, cells through a face.
+///
+/// The answer is the same whether a relation is stored (Mesh::StoreRelation) or worked out on demand.
 namespace dynmesh {
-
-struct Relation {
-  EntityKind from;
-  EntityKind to;
-};
 
 /// Rows of neighbours, as compressed sparse rows: row i is ids[offsets[i] .. offsets[i + 1]).
 struct CsrTable {
@@ -30,6 +31,66 @@ struct CsrTable {
     return absl::MakeConstSpan(ids).subspan(offsets[i], offsets[i + 1] - offsets[i]);
   }
 };
+
+namespace internal {
+
+template <typename Fn>
+void ForEachStoredRow(const Mesh& mesh, Relation relation, const StoredRows& stored, absl::Span<const Slot> slots,
+                      RowBlock& block, Fn& fn) {
+  for (Slot slot : slots) {
+    if (!stored.IsOpen(slot)) {
+      fn(slot, stored.Row(slot));
+    } else {
+      block.Gather(mesh, relation, {&slot, 1});
+      fn(slot, block.Row(0));
+    }
+  }
+}
+
+template <typename Fn>
+void ForEachRow(const Mesh& mesh, Relation relation, absl::Span<const Slot> slots, RowBlock& block, Fn& fn) {
+  if (const StoredRows* stored = mesh.stored().Find(relation)) {
+    return ForEachStoredRow(mesh, relation, *stored, slots, block, fn);
+  }
+  const CellEdgeRows* cell_edges = mesh.stored().cell_edges();
+  if (cell_edges != nullptr && relation == kStorableRelations[0]) {
+    for (Slot slot : slots) fn(slot, cell_edges->Row(slot));
+    return;
+  }
+  for (size_t begin = 0; begin < slots.size(); begin += RowBlock::kMaxRows) {
+    const auto part = slots.subspan(begin, RowBlock::kMaxRows);
+    block.Gather(mesh, relation, part);
+    for (size_t i = 0; i < part.size(); ++i) fn(part[i], block.Row(i));
+  }
+}
+
+}  // namespace internal
+
+/// Calls fn(slot, row) for each of `slots`, in order; a row is valid during the call. Nothing is gathered in between:
+/// the way to walk many rows. REQUIRES: all are live, fn does not change the mesh.
+template <typename Fn>
+void ForEachRow(const Mesh& mesh, Relation relation, absl::Span<const Slot> slots, Fn fn) {
+  RowBlock block;
+  internal::ForEachRow(mesh, relation, slots, block, fn);
+}
+
+/// The same for all live entities of relation.from, ascending: cheaper than naming them (InverseRows).
+template <typename Fn>
+void ForEachRow(const Mesh& mesh, Relation relation, Fn fn) {
+  const BitSet& live = mesh.slots(relation.from).live();
+  if (!mesh.stored().Has(relation) && InverseRows::Pays(mesh, relation)) {
+    const InverseRows rows(mesh, relation);
+    return live.ForEach([&](Slot slot) { fn(slot, rows.Row(slot)); });
+  }
+  std::array<Slot, RowBlock::kMaxRows> part;
+  RowBlock block;
+  for (Slot next = 0;;) {
+    const size_t count = live.Collect(next, part.data(), part.size());
+    if (count == 0) return;
+    internal::ForEachRow(mesh, relation, absl::MakeConstSpan(part.data(), count), block, fn);
+    next = part[count - 1] + 1;
+  }
+}
 
 /// Appends the neighbours of `slot` to `out`. REQUIRES: `slot` is live in `mesh`.
 void AppendNeighbors(const Mesh& mesh, Relation relation, Slot slot, std::vector<Slot>& out);

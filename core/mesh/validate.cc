@@ -4,6 +4,7 @@
 #include <map>
 
 #include "absl/strings/str_cat.h"
+#include "core/mesh/row_block.h"
 
 namespace dynmesh {
 
@@ -24,6 +25,8 @@ class MeshValidator {
     CheckPrimaries(EntityKind::kFace);
     CheckBoundary();
     CheckCountsAndStamps();
+    CheckDegenerate();
+    CheckStoredRelations();
     CheckAttributes();
     CheckChecksum();
     return std::move(violations_);
@@ -277,6 +280,37 @@ class MeshValidator {
     }
   }
 
+  void CheckDegenerate() {
+    uint32_t degenerate = 0;
+    for (EntityKind kind : {EntityKind::kEdge, EntityKind::kFace, EntityKind::kCell}) {
+      mesh_.slots(kind).live().ForEach([&](Slot slot) {
+        const EntityId id(kind, slot);
+        if (mesh_.IsDegenerate(id) != HasRepeats(mesh_.VerticesOf(id))) {
+          Report(EntityKindName(kind), " ", slot, " has a wrong degenerate flag");
+        }
+        degenerate += mesh_.IsElement(id) && mesh_.IsDegenerate(id);
+      });
+    }
+    if (degenerate != mesh_.num_degenerate_) Report("wrong count of degenerate elements");
+  }
+
+  /// Each stored row is what brute force gathers, or open.
+  void CheckStoredRelations() {
+    for (Relation relation : kStorableRelations) {
+      if (!mesh_.stored().Has(relation)) continue;
+      mesh_.slots(relation.from).live().ForEach([&](Slot slot) { CheckStoredRow(relation, slot); });
+    }
+  }
+
+  void CheckStoredRow(Relation relation, Slot slot) {
+    const StoredRows* rows = mesh_.stored().Find(relation);
+    if (rows != nullptr && rows->IsOpen(slot)) return;
+    const auto stored = rows != nullptr ? rows->Row(slot) : mesh_.stored().cell_edges()->Row(slot);
+    block_.Gather(mesh_, relation, {&slot, 1});
+    if (stored == block_.Row(0)) return;
+    Report("stored row ", EntityKindName(relation.from), " ", slot, " -> ", EntityKindName(relation.to), " is wrong");
+  }
+
   void CheckAttributes() {
     for (const AttributeColumn& column : mesh_.attributes()) {
       const Slot limit = mesh_.slots(column.spec().kind).limit();
@@ -317,6 +351,7 @@ class MeshValidator {
   const Mesh& mesh_;
   const size_t max_violations_;
   std::vector<std::string> violations_;
+  RowBlock block_;
 };
 
 std::vector<std::string> Validate(const Mesh& mesh, size_t max_violations) {

@@ -2,6 +2,7 @@
 #define DYNMESH_CORE_MESH_VERTEX_CYCLE_H_
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 
 #include "absl/types/optional.h"
@@ -30,6 +31,16 @@ struct FaceCode {
     return flipped() ? *this : FaceCode{static_cast<uint8_t>((n - rotation()) % n)};
   }
 };
+
+/// Whether a vertex is named twice.
+inline bool HasRepeats(absl::Span<const VertexId> vertices) {
+  for (size_t i = 1; i < vertices.size(); ++i) {
+    for (size_t j = 0; j < i; ++j) {
+      if (vertices[i] == vertices[j]) return true;
+    }
+  }
+  return false;
+}
 
 /// How `stored` lies against `key`, or nullopt if they are not the same cycle.
 absl::optional<FaceCode> MatchFace(absl::Span<const VertexId> stored, absl::Span<const VertexId> key);

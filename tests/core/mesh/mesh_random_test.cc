@@ -32,6 +32,35 @@ TEST_P(MeshRandomTest, EveryStateEqualsBruteForce) {
   }
 }
 
+void StoreAll(Mesh& mesh) {
+  for (Relation relation : kStorableRelations) ASSERT_TRUE(mesh.StoreRelation(relation, true).ok());
+}
+
+TEST_P(MeshRandomTest, StoredRelationsStayCurrentWheneverTheyAreSwitched) {
+  for (uint32_t seed = 1; seed <= 3; ++seed) {
+    SCOPED_TRACE(seed);
+    Mesh mesh;
+    ElementModel model;
+    RandomEditor editor(mesh, model, seed, GetParam().options);
+    if (seed % 2 == 0) StoreAll(mesh);
+    for (int batch = 0; batch < 30; ++batch) {
+      const Relation relation = kStorableRelations[editor.Uniform(kNumStorableRelations)];
+      ASSERT_TRUE(mesh.StoreRelation(relation, editor.Uniform(3) > 0).ok());
+      const ElementModel before = model;
+      mesh.BeginBatch();
+      for (int i = editor.Uniform(8); i >= 0; --i) editor.Edit();
+      if (editor.Uniform(4) == 0) {
+        mesh.Rollback();
+        model = before;
+      } else {
+        Commit(mesh);
+      }
+      ExpectEqualsOracle(mesh, model);
+      if (HasFailure()) FAIL() << "seed " << seed << " batch " << batch;
+    }
+  }
+}
+
 TEST_P(MeshRandomTest, RollbackRestoresEverything) {
   RandomEditOptions options = GetParam().options;
   options.attributes = true;
@@ -64,6 +93,7 @@ TEST_P(MeshRandomTest, PilesOfThousandsOnFewVerticesStaySound) {
   Mesh mesh;
   ElementModel model;
   RandomEditor editor(mesh, model, 3, options);
+  StoreAll(mesh);
   for (int batch = 0; batch < 8; ++batch) {
     const ElementModel before = model;
     mesh.BeginBatch();

@@ -1,0 +1,175 @@
+#ifndef DYNMESH_CORE_MESH_POOLED_LISTS_H_
+#define DYNMESH_CORE_MESH_POOLED_LISTS_H_
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "absl/types/span.h"
+#include "core/mesh/ids.h"
+
+namespace dynmesh {
+
+/// Many small lists in one pool, a list for each slot. Lists are contiguous; a list that outgrows its room moves to a
+/// larger one, and rooms are recycled by size class, so no list has a heap block of its own.
+///
+/// Cost: PushBack and PopBack amortised O(1). Invalidates: both invalidate all spans.
+/// Thread safety: that of std::vector.
+template <typename T>
+class PooledLists {
+ public:
+  static constexpr uint32_t kMaxLength = 50'000'000;
+  /// Of all lists together, with a margin for the room that size classes leave.
+  static constexpr uint64_t kMaxEntries = 0xc0000000u;
+
+  absl::Span<const T> Of(Slot slot) const {
+    if (slot >= lists_.size()) return {};
+    const List& list = lists_[slot];
+    return absl::MakeConstSpan(pool_.data() + list.offset, list.length);
+  }
+  absl::Span<T> MutableOf(Slot slot) {
+    const List& list = lists_[slot];
+    return absl::MakeSpan(pool_.data() + list.offset, list.length);
+  }
+
+  Slot size() const { return lists_.size(); }
+  uint32_t Length(Slot slot) const { return slot < lists_.size() ? lists_[slot].length : 0; }
+
+  /// Whether `count` entries more have room within the 32-bit limits, whatever list they go to.
+  bool HasRoom(uint32_t count) const { return longest_ + count <= kMaxLength && pool_.size() < kMaxPool; }
+
+  /// `first_room`: room that an empty list is given, 1-8; what most lists will need saves them moves.
+  void PushBack(Slot slot, T value, uint32_t first_room = 2) {
+    if (slot >= lists_.size()) lists_.resize(slot + 1);
+    const uint32_t size_class = lists_[slot].size_class;
+    if (lists_[slot].length == Capacity(size_class)) Move(slot, size_class == 0 ? first_room : NextClass(size_class));
+    List& list = lists_[slot];
+    pool_[list.offset + list.length++] = value;
+    longest_ = std::max<uint32_t>(longest_, list.length);
+  }
+
+  /// REQUIRES: the list is not empty.
+  void PopBack(Slot slot) {
+    List& list = lists_[slot];
+    --list.length;
+    if (list.length < Capacity(list.size_class) / 2 && list.size_class > kSmallClasses) {
+      Move(slot, ClassFor(list.length + list.length / 4));
+    } else if (list.length == 0) {
+      Move(slot, 0);
+    }
+  }
+
+  /// Empties a list and recycles its room.
+  void Clear(Slot slot) {
+    if (slot >= lists_.size()) return;
+    lists_[slot].length = 0;
+    Move(slot, 0);
+  }
+
+  /// Makes empty lists 0, 1, ... with room for `lengths` entries. REQUIRES: no list yet; fewer than kMaxEntries in all.
+  void Layout(absl::Span<const uint32_t> lengths) {
+    lists_.reserve(lengths.size() + lengths.size() / 16);
+    lists_.resize(lengths.size());
+    uint64_t offset = 0;
+    for (size_t i = 0; i < lengths.size(); ++i) {
+      lists_[i].size_class = ClassFor(lengths[i]);
+      lists_[i].offset = offset;
+      offset += Capacity(lists_[i].size_class);
+      longest_ = std::max(longest_, lengths[i]);
+    }
+    pool_.reserve(offset + offset / 16);
+    pool_.resize(offset);
+  }
+
+  /// PushBack into a room made by Layout().
+  void Append(Slot slot, T value) {
+    List& list = lists_[slot];
+    pool_[list.offset + list.length++] = value;
+  }
+
+  void Reserve(size_t lists, size_t entries) {
+    lists_.reserve(lists);
+    pool_.reserve(entries);
+  }
+
+  size_t memory_bytes() const {
+    size_t bytes = lists_.size() * sizeof(List) + pool_.size() * sizeof(T);
+    for (const auto& rooms : free_rooms_) bytes += rooms.size() * sizeof(uint32_t);
+    return bytes;
+  }
+
+ private:
+  // Size classes: 0 has no room; 1..8 hold 1..8; then four a doubling up to 256 (class 28), then two.
+  static constexpr uint32_t kSmallClasses = 8;
+  static constexpr int kNumClasses = 64;
+  static constexpr uint64_t kMaxPool = 0xf0000000u;
+
+  static constexpr std::array<uint32_t, kNumClasses> MakeCapacities() {
+    std::array<uint32_t, kNumClasses> capacities{};
+    uint32_t base = 8;
+    int c = 0;
+    for (; c <= 8; ++c) capacities[c] = c;
+    for (; base < 256; base *= 2) {
+      for (int quarter = 1; quarter <= 4; ++quarter) capacities[c++] = base + base / 4 * quarter;
+    }
+    for (; c < kNumClasses; base *= 2) {
+      for (int half = 1; half <= 2 && c < kNumClasses; ++half) capacities[c++] = base + base / 2 * half;
+    }
+    return capacities;
+  }
+  static constexpr std::array<uint32_t, kNumClasses> kCapacities = MakeCapacities();
+  static_assert(kCapacities[kNumClasses - 1] >= kMaxLength);
+
+  struct List {
+    uint32_t offset = 0;
+    uint32_t length : 26 = 0;
+    uint32_t size_class : 6 = 0;
+  };
+
+  static uint32_t Capacity(uint32_t size_class) { return kCapacities[size_class]; }
+
+  /// Small lists grow by two: each room that is left behind waits for another list to need its size.
+  static uint32_t NextClass(uint32_t size_class) {
+    return size_class < kSmallClasses ? size_class + 2 - size_class % 2 : size_class + 1;
+  }
+
+  static uint32_t ClassFor(uint32_t length) {
+    if (length <= kSmallClasses) return length;
+    return std::lower_bound(kCapacities.begin(), kCapacities.end(), length) - kCapacities.begin();
+  }
+
+  /// Gives the list a room of another size class and recycles the old one.
+  void Move(Slot slot, uint32_t new_class) {
+    const uint32_t old_class = lists_[slot].size_class;
+    if (new_class == old_class) return;
+    const uint32_t old_offset = lists_[slot].offset;
+    const uint32_t new_offset = new_class == 0 ? 0 : TakeRoom(new_class);
+    std::copy_n(pool_.data() + old_offset, lists_[slot].length, pool_.data() + new_offset);
+    if (old_class != 0) free_rooms_[old_class].push_back(old_offset);
+    lists_[slot].offset = new_offset;
+    lists_[slot].size_class = new_class;
+  }
+
+  uint32_t TakeRoom(uint32_t size_class) {
+    auto& rooms = free_rooms_[size_class];
+    if (!rooms.empty()) {
+      const uint32_t offset = rooms.back();
+      rooms.pop_back();
+      return offset;
+    }
+    const uint32_t offset = pool_.size();
+    pool_.resize(pool_.size() + Capacity(size_class));
+    return offset;
+  }
+
+  std::vector<List> lists_;
+  std::vector<T> pool_;
+  uint32_t longest_ = 0;  ///< length of the longest list so far
+  std::array<std::vector<uint32_t>, kNumClasses> free_rooms_;
+};
+
+}  // namespace dynmesh
+
+#endif  // DYNMESH_CORE_MESH_POOLED_LISTS_H_

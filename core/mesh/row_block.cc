@@ -1,0 +1,381 @@
+#include "core/mesh/row_block.h"
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+
+#include "core/mesh/sort_unique.h"
+
+namespace dynmesh {
+namespace {
+
+/// How many rows ahead memory is fetched.
+constexpr size_t kAhead = 16;
+
+/// kStoredEdge[n - 3][code][k]: FaceCode{code}.StoredEdge(k, n), as a table.
+using StoredEdges = std::array<std::array<std::array<uint8_t, kMaxFaceVertices>, 8>, 2>;
+constexpr StoredEdges MakeStoredEdges() {
+  StoredEdges stored{};
+  for (int n = 3; n <= 4; ++n) {
+    for (int code = 0; code < 8; ++code) {
+      for (int k = 0; k < n; ++k) stored[n - 3][code][k] = FaceCode{uint8_t(code)}.StoredEdge(k, n);
+    }
+  }
+  return stored;
+}
+constexpr StoredEdges kStoredEdge = MakeStoredEdges();
+
+/// Faces of a cell at each of its vertices, as bits.
+using VertexFaces = std::array<std::array<uint8_t, kMaxElementVertices>, kNumElementTypes + 1>;
+VertexFaces MakeVertexFaces() {
+  VertexFaces faces{};
+  for (ElementType type : kElementTypes) {
+    const ElementTemplate& shape = TemplateOf(type);
+    for (int i = 0; i < shape.num_faces; ++i) {
+      for (int k = 0; k < shape.faces[i].size; ++k) {
+        faces[static_cast<int>(type)][shape.faces[i].vertices[k]] |= 1 << i;
+      }
+    }
+  }
+  return faces;
+}
+const VertexFaces kVertexFaces = MakeVertexFaces();
+
+}  // namespace
+
+void RowBlock::Grow(size_t needed) {
+  const size_t capacity = std::max(needed, 2 * capacity_ + 1024);
+  auto ids = std::make_unique_for_overwrite<Slot[]>(capacity);
+  if (size_ > 0) std::memcpy(ids.get(), ids_.get(), size_ * sizeof(Slot));
+  ids_ = std::move(ids);
+  capacity_ = capacity;
+}
+
+/// One method for each way of gathering a row; they append to the block, then Finish() makes the row canonical.
+class RowKernels {
+ public:
+  RowKernels(const Mesh& mesh, RowBlock& block) : mesh_(mesh), block_(block), plain_(mesh.IsPlain()) {}
+
+  void Gather(Relation relation, absl::Span<const Slot> slots) {
+    block_.size_ = 0;
+    block_.offsets_[0] = 0;
+    switch (relation.from) {
+      case EntityKind::kVertex:
+        return OfVertices(relation.to, slots);
+      case EntityKind::kEdge:
+        return OfEdges(relation.to, slots);
+      case EntityKind::kFace:
+        return OfFaces(relation.to, slots);
+      case EntityKind::kCell:
+        return OfCells(relation.to, slots);
+    }
+  }
+
+ private:
+  template <typename Fn>
+  void ForEach(absl::Span<const Slot> slots, Fn fn) {
+    for (size_t i = 0; i < slots.size(); ++i) {
+      fn(slots[i]);
+      block_.offsets_[i + 1] = block_.size_;
+    }
+  }
+
+  // ---- Appending ----
+
+  void Push(Slot slot) {
+    *block_.Room(1) = slot;
+    ++block_.size_;
+  }
+
+  template <typename Ids>
+  void PushAll(const Ids& ids) {
+    Slot* out = block_.Room(ids.size());
+    for (auto id : ids) *out++ = id.slot();
+    block_.size_ += ids.size();
+  }
+
+  /// Sorts the row that began at `begin` and drops repeats.
+  void Canonicalize(size_t begin) {
+    block_.size_ = begin + SortUnique(block_.ids_.get() + begin, block_.size_ - begin);
+  }
+
+  /// The same where only meshes that are not plain have repeats.
+  void CanonicalizePlain(size_t begin) {
+    plain_ ? SortDistinct(block_.ids_.get() + begin, block_.size_ - begin) : Canonicalize(begin);
+  }
+
+  /// The same, without `self`.
+  void CanonicalizeWithout(size_t begin, Slot self) {
+    block_.size_ = begin + SortUnique(block_.ids_.get() + begin, block_.size_ - begin, self);
+  }
+
+  // ---- Vertices ----
+
+  void OfVertices(EntityKind to, absl::Span<const Slot> slots) {
+    switch (to) {
+      case EntityKind::kVertex:
+        return ForEach(slots, [&](Slot v) { VertexVertices(VertexId(v)); });
+      case EntityKind::kEdge:
+        return ForEach(slots, [&](Slot v) {
+          const size_t begin = block_.size_;
+          PushAll(mesh_.IncidentEdges(VertexId(v)));
+          CanonicalizePlain(begin);
+        });
+      case EntityKind::kFace:
+        return ForEach(slots, [&](Slot v) { VertexFaces(VertexId(v)); });
+      case EntityKind::kCell:
+        return ForEach(slots, [&](Slot v) { VertexCells(VertexId(v)); });
+    }
+  }
+
+  VertexId OtherEnd(EdgeId e, VertexId v) const {
+    const auto& ends = mesh_.edge_vertices_[e.slot()];
+    return VertexId(ends[0].slot() ^ ends[1].slot() ^ v.slot());
+  }
+
+  void VertexVertices(VertexId v) {
+    const size_t begin = block_.size_;
+    const auto edges = mesh_.IncidentEdges(v);
+    Slot* out = block_.Room(edges.size());
+    for (EdgeId e : edges) *out++ = OtherEnd(e, v).slot();
+    block_.size_ += edges.size();
+    plain_ ? Canonicalize(begin) : CanonicalizeWithout(begin, v.slot());
+  }
+
+  /// The neighbour of `v` in face `f` that is not `x`, in a mesh without degenerate faces.
+  Slot OtherNeighbor(FaceId f, VertexId v, VertexId x) const {
+    const VertexId* cycle = &mesh_.face_vertices_[size_t{f.slot()} * mesh_.face_stride_];
+    if (mesh_.FaceSize(f) == 3) return cycle[0].slot() ^ cycle[1].slot() ^ cycle[2].slot() ^ v.slot() ^ x.slot();
+    const int at = std::find(cycle, cycle + 4, v) - cycle;
+    return cycle[(at + 1) % 4].slot() ^ cycle[(at + 3) % 4].slot() ^ x.slot();
+  }
+
+  /// A face at a vertex v, and the neighbours x < y of v in it.
+  struct Corner {
+    FaceId face;
+    Slot x, y;
+  };
+
+  /// Each face at `v` once, in a mesh without degenerate faces. Every face is met by both its edges at `v` and kept
+  /// by one: what is not kept is overwritten, because a branch would be mispredicted half the time.
+  absl::Span<const Corner> CornersAt(VertexId v) {
+    size_t count = 0;
+    for (EdgeId e : mesh_.IncidentEdges(v)) {
+      const VertexId x = OtherEnd(e, v);
+      const auto faces = mesh_.IncidentFaces(e);
+      if (count + faces.size() > corners_.size()) corners_.resize(2 * (count + faces.size()));
+      Corner* const corners = corners_.data();
+      for (FaceId f : faces) {
+        const Slot y = OtherNeighbor(f, v, x);
+        corners[count] = {f, x.slot(), y};
+        count += x.slot() < y;
+      }
+    }
+    return absl::MakeConstSpan(corners_.data(), count);
+  }
+
+  void VertexFaces(VertexId v) {
+    const size_t begin = block_.size_;
+    if (!plain_) {
+      for (EdgeId e : mesh_.IncidentEdges(v)) PushAll(mesh_.IncidentFaces(e));
+      return Canonicalize(begin);
+    }
+    const auto corners = CornersAt(v);
+    Slot* out = block_.Room(corners.size());
+    for (const Corner& corner : corners) *out++ = corner.face.slot();
+    block_.size_ += corners.size();
+    SortDistinct(block_.ids_.get() + begin, corners.size());
+  }
+
+  void VertexCells(VertexId v) {
+    const size_t begin = block_.size_;
+    if (!plain_) {
+      for (EdgeId e : mesh_.IncidentEdges(v)) PushEdgeCells(e);
+      return Canonicalize(begin);
+    }
+    for (const Corner& corner : CornersAt(v)) {
+      const auto cells = mesh_.IncidentCells(corner.face);
+      Slot* out = block_.Room(cells.size());
+      for (CellId c : cells) {
+        *out = c.slot();
+        out += CountsHere(c, v, corner);
+      }
+      block_.size_ = out - block_.ids_.get();
+    }
+    SortDistinct(block_.ids_.get() + begin, block_.size_ - begin);
+  }
+
+  /// Whether the corner's is the one of the faces of `c` at `v` where `c` is counted.
+  bool CountsHere(CellId c, VertexId v, const Corner& corner) const {
+    const VertexId* vertices = &mesh_.cell_vertices_[size_t{c.slot()} * mesh_.cell_vertex_stride_];
+    const ElementType type = mesh_.Type(c);
+    if (type == ElementType::kTetrahedron) {
+      const Slot all = vertices[0].slot() ^ vertices[1].slot() ^ vertices[2].slot() ^ vertices[3].slot();
+      return (all ^ v.slot() ^ corner.x ^ corner.y) > corner.y;
+    }
+    const OrientedFace* faces = &mesh_.cell_faces_[size_t{c.slot()} * mesh_.cell_face_stride_];
+    int local = 0;
+    while (vertices[local] != v) ++local;
+    for (unsigned bits = kVertexFaces[static_cast<int>(type)][local]; bits != 0; bits &= bits - 1) {
+      if (faces[std::countr_zero(bits)].face() < corner.face) return false;
+    }
+    return true;
+  }
+
+  // ---- Edges ----
+
+  void OfEdges(EntityKind to, absl::Span<const Slot> slots) {
+    switch (to) {
+      case EntityKind::kVertex:
+        return ForEach(slots, [&](Slot e) { PushAll(mesh_.edge_vertices_[e]); });
+      case EntityKind::kEdge:
+        return ForEach(slots, [&](Slot e) {
+          const size_t begin = block_.size_;
+          for (VertexId v : mesh_.edge_vertices_[e]) PushAll(mesh_.IncidentEdges(v));
+          CanonicalizeWithout(begin, e);
+        });
+      case EntityKind::kFace:
+        return ForEach(slots, [&](Slot e) {
+          const size_t begin = block_.size_;
+          PushAll(mesh_.IncidentFaces(EdgeId(e)));
+          CanonicalizePlain(begin);
+        });
+      case EntityKind::kCell:
+        return ForEach(slots, [&](Slot e) {
+          const size_t begin = block_.size_;
+          PushEdgeCells(EdgeId(e));
+          Canonicalize(begin);
+        });
+    }
+  }
+
+  void PushEdgeCells(EdgeId e) {
+    for (FaceId f : mesh_.IncidentFaces(e)) PushAll(mesh_.IncidentCells(f));
+  }
+
+  // ---- Faces ----
+
+  void OfFaces(EntityKind to, absl::Span<const Slot> slots) {
+    switch (to) {
+      case EntityKind::kVertex:
+        return ForEach(slots, [&](Slot f) { PushAll(mesh_.Vertices(FaceId(f))); });
+      case EntityKind::kEdge:
+        return ForEach(slots, [&](Slot f) { PushAll(mesh_.Edges(FaceId(f))); });
+      case EntityKind::kFace:
+        return ForEach(slots, [&](Slot f) {
+          const size_t begin = block_.size_;
+          for (EdgeId e : mesh_.Edges(FaceId(f))) PushAll(mesh_.IncidentFaces(e));
+          CanonicalizeWithout(begin, f);
+        });
+      case EntityKind::kCell:
+        return ForEach(slots, [&](Slot f) {
+          const size_t begin = block_.size_;
+          PushAll(mesh_.IncidentCells(FaceId(f)));
+          Canonicalize(begin);
+        });
+    }
+  }
+
+  // ---- Cells ----
+
+  void OfCells(EntityKind to, absl::Span<const Slot> slots) {
+    switch (to) {
+      case EntityKind::kVertex:
+        return ForEach(slots, [&](Slot c) { PushAll(mesh_.Vertices(CellId(c))); });
+      case EntityKind::kEdge:
+        return CellEdges(slots);
+      case EntityKind::kFace:
+        return ForEach(slots, [&](Slot c) {
+          for (OrientedFace oriented : mesh_.Faces(CellId(c))) Push(oriented.face().slot());
+        });
+      case EntityKind::kCell:
+        return ForEach(slots, [&](Slot c) { CellCells(CellId(c)); });
+    }
+  }
+
+  void CellCells(CellId c) {
+    const size_t begin = block_.size_;
+    Slot* out = block_.Room(kMaxElementFaces);
+    bool crowded = false;
+    for (OrientedFace oriented : mesh_.Faces(c)) {
+      const auto& uses = mesh_.face_cells_[oriented.face().slot()];
+      crowded |= uses[1] == Mesh::kOverflow;
+      *out = uses[0].slot() ^ uses[1].slot() ^ c.slot();
+      out += uses[1].valid();
+    }
+    if (!crowded) {
+      block_.size_ = out - block_.ids_.get();
+    } else {
+      for (OrientedFace oriented : mesh_.Faces(c)) PushAll(mesh_.IncidentCells(oriented.face()));
+    }
+    CanonicalizeWithout(begin, c.slot());
+  }
+
+  void CellEdges(absl::Span<const Slot> slots) {
+    Slot* out = block_.Room(slots.size() * kMaxElementEdges);
+    Slot* const begin = out;
+    const size_t ahead = IsScattered(slots) ? kAhead : slots.size();
+    for (size_t i = 0; i < ahead % slots.size(); ++i) FetchFaceEdges(slots[i]);
+    for (size_t i = 0; i < slots.size(); ++i) {
+      if (i + ahead < slots.size()) FetchFaceEdges(slots[i + ahead]);
+      const ElementType type = mesh_.Type(CellId(slots[i]));
+      const OrientedFace* faces = &mesh_.cell_faces_[size_t{slots[i]} * mesh_.cell_face_stride_];
+      out = type == ElementType::kTetrahedron ? TetEdges(faces, mesh_.face_edges_.data(), mesh_.face_stride_, out)
+                                              : EdgesOf(CellId(slots[i]), out);
+      block_.offsets_[i + 1] = out - begin;
+    }
+    block_.size_ = out - begin;
+  }
+
+  /// Whether the faces of cells that follow each other lie far apart, so that fetching them ahead pays.
+  bool IsScattered(absl::Span<const Slot> slots) const {
+    size_t distance = 0;
+    for (size_t i = kAhead; i < slots.size(); i += kAhead) {
+      const Slot one = FirstFace(slots[i - 1]), next = FirstFace(slots[i]);
+      distance += one < next ? next - one : one - next;
+    }
+    return distance > slots.size() * kAhead;
+  }
+
+  Slot FirstFace(Slot c) const { return mesh_.cell_faces_[size_t{c} * mesh_.cell_face_stride_].face().slot(); }
+
+  void FetchFaceEdges(Slot c) const {
+    const OrientedFace* faces = &mesh_.cell_faces_[size_t{c} * mesh_.cell_face_stride_];
+    for (int i = 0; i < 3; ++i) {
+      __builtin_prefetch(&mesh_.face_edges_[size_t{faces[i].face().slot()} * mesh_.face_stride_]);
+    }
+  }
+
+  /// Edges 0-1, 1-2, 2-0, 0-3, 1-3, 2-3 from faces 0 1 3, 1 2 3 and 2 0 3.
+  static Slot* TetEdges(const OrientedFace* faces, const EdgeId* face_edges, size_t stride, Slot* out) {
+    const EdgeId* const first = face_edges + faces[0].face().slot() * stride;
+    const EdgeId* const second = face_edges + faces[1].face().slot() * stride;
+    const EdgeId* const third = face_edges + faces[2].face().slot() * stride;
+    const auto& in_first = kStoredEdge[0][faces[0].code().value];
+    const auto& in_second = kStoredEdge[0][faces[1].code().value];
+    out[0] = first[in_first[0]].slot();
+    out[1] = second[in_second[0]].slot();
+    out[2] = third[kStoredEdge[0][faces[2].code().value][0]].slot();
+    out[3] = first[in_first[2]].slot();
+    out[4] = first[in_first[1]].slot();
+    out[5] = second[in_second[1]].slot();
+    return out + 6;
+  }
+
+  Slot* EdgesOf(CellId c, Slot* out) const {
+    const int num_edges = TemplateOf(mesh_.Type(c)).num_edges;
+    for (int e = 0; e < num_edges; ++e) *out++ = mesh_.Edge(c, e).slot();
+    return out;
+  }
+
+  const Mesh& mesh_;
+  RowBlock& block_;
+  const bool plain_;
+  std::vector<Corner> corners_;
+};
+
+void RowBlock::Gather(const Mesh& mesh, Relation relation, absl::Span<const Slot> slots) {
+  RowKernels(mesh, *this).Gather(relation, slots);
+}
+
+}  // namespace dynmesh
