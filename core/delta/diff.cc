@@ -8,6 +8,14 @@ namespace {
 
 constexpr int kAttributeStage = 4;
 constexpr int kDone = 5;
+constexpr size_t kTypicalVertices = 4;  ///< of an element, for room
+
+/// Room for `count` items more, in steps that keep appending linear.
+template <typename T>
+void MakeRoom(size_t count, std::vector<T>& items) {
+  const size_t needed = items.size() + count;
+  if (needed > items.capacity()) items.reserve(std::max(needed, 2 * items.capacity()));
+}
 
 /// Appends after-images of slots to a delta.
 class DiffBuilder {
@@ -51,31 +59,36 @@ class DiffBuilder {
   void VisitRange(const DiffCursor& cursor, Slot end) {
     if (cursor.stage == kAttributeStage) return VisitRows(cursor, end);
     const EntityKind kind = kEntityKinds[cursor.stage];
-    mesh_.changed(kind).ForEachSince(from_, cursor.next, end, [&](Slot slot) {
-      ++items_;
-      kind == EntityKind::kVertex ? VisitVertex(VertexId(slot)) : VisitElement({kind, slot});
+    const size_t count = mesh_.changed(kind).CountSince(from_, cursor.next, end);
+    if (count == 0) return;
+    items_ += count;
+    kind == EntityKind::kVertex ? VisitVertices(cursor.next, end, count) : VisitElements(kind, cursor.next, end, count);
+  }
+
+  /// Of `count` changed slots in [begin, end).
+  void VisitVertices(Slot begin, Slot end, size_t count) {
+    MakeRoom(count, delta_.vertex_slots);
+    MakeRoom(count, delta_.positions);
+    mesh_.changed(EntityKind::kVertex).ForEachSince(from_, begin, end, [&](Slot slot) {
+      if (!mesh_.IsLive(VertexId(slot))) return delta_.removed_vertices.push_back(slot);
+      delta_.vertex_slots.push_back(slot);
+      delta_.positions.push_back(mesh_.Position(VertexId(slot)));
     });
   }
 
-  void VisitVertex(VertexId v) {
-    if (!mesh_.IsLive(v)) {
-      delta_.removed_vertices.push_back(v.slot());
-      return;
-    }
-    delta_.vertex_slots.push_back(v.slot());
-    delta_.positions.push_back(mesh_.Position(v));
-  }
-
-  void VisitElement(EntityId id) {
-    ElementChanges& changes = delta_.OfKind(id.kind);
-    if (!mesh_.IsLive(id) || !mesh_.IsElement(id)) {
-      changes.removed.push_back(id.slot);
-      return;
-    }
-    const auto vertices = mesh_.VerticesOf(id);
-    changes.slots.push_back(id.slot);
-    changes.types.push_back(mesh_.Type(id));
-    changes.vertices.insert(changes.vertices.end(), vertices.begin(), vertices.end());
+  void VisitElements(EntityKind kind, Slot begin, Slot end, size_t count) {
+    ElementChanges& changes = delta_.OfKind(kind);
+    MakeRoom(count, changes.slots);
+    MakeRoom(count, changes.types);
+    MakeRoom(count * kTypicalVertices, changes.vertices);
+    mesh_.changed(kind).ForEachSince(from_, begin, end, [&](Slot slot) {
+      const EntityId id(kind, slot);
+      if (!mesh_.IsLive(id) || !mesh_.IsElement(id)) return changes.removed.push_back(slot);
+      const auto vertices = mesh_.VerticesOf(id);
+      changes.slots.push_back(slot);
+      changes.types.push_back(mesh_.Type(id));
+      changes.vertices.insert(changes.vertices.end(), vertices.begin(), vertices.end());
+    });
   }
 
   /// Rows of dead slots travel too, as the zeros that removal left: derived entities die unseen by a mirror.

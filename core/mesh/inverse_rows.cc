@@ -8,48 +8,94 @@ namespace dynmesh {
 namespace {
 
 constexpr uint32_t kFew = 1000;
+constexpr uint64_t kMaxEntries = uint64_t{1} << 31;
 
-/// Calls fn(upper, row of lower entities) for every upper entity, ascending.
 template <typename Fn>
-void ForEachRowBelow(const Mesh& mesh, Relation relation, Fn fn) {
+void ForEachLive(const Mesh& mesh, EntityKind kind, Fn fn) {
+  mesh.slots(kind).live().ForEach(fn);
+}
+
+/// Calls fn(cell, edge) for the edges of every cell.
+template <typename Fn>
+void ForEachCellEdge(const Mesh& mesh, Fn fn) {
   std::array<Slot, RowBlock::kMaxRows> part;
   RowBlock block;
   for (Slot next = 0;;) {
-    const size_t count = mesh.slots(relation.to).live().Collect(next, part.data(), part.size());
+    const size_t count = mesh.slots(EntityKind::kCell).live().Collect(next, part.data(), part.size());
     if (count == 0) return;
-    block.Gather(mesh, {relation.to, relation.from}, absl::MakeConstSpan(part.data(), count));
-    for (size_t i = 0; i < count; ++i) fn(part[i], block.Row(i));
+    block.Gather(mesh, kStorableRelations[0], absl::MakeConstSpan(part.data(), count));
+    for (size_t i = 0; i < count; ++i) {
+      for (Slot e : block.Row(i)) fn(part[i], e);
+    }
     next = part[count - 1] + 1;
   }
+}
+
+/// Calls fn(neighbor, slot) for every entry `neighbor` of every row `slot` of vertex->vertices, vertex->faces,
+/// vertex->cells or edge->cells, neighbours ascending; perhaps more than once, and for slot = neighbor.
+template <typename Fn>
+void ForEachEntry(const Mesh& mesh, Relation relation, Fn fn) {
+  switch (relation.to) {
+    case EntityKind::kFace:
+      return ForEachLive(mesh, EntityKind::kFace, [&](Slot f) {
+        for (VertexId v : mesh.Vertices(FaceId(f))) fn(f, v.slot());
+      });
+    case EntityKind::kCell:
+      if (relation.from == EntityKind::kEdge) return ForEachCellEdge(mesh, fn);
+      return ForEachLive(mesh, EntityKind::kCell, [&](Slot c) {
+        for (VertexId v : mesh.Vertices(CellId(c))) fn(c, v.slot());
+      });
+    default:
+      return ForEachLive(mesh, EntityKind::kVertex, [&](Slot w) {
+        for (EdgeId e : mesh.IncidentEdges(VertexId(w))) {
+          const auto ends = mesh.Vertices(e);
+          fn(w, ends[0].slot() ^ ends[1].slot() ^ w);
+        }
+      });
+  }
+}
+
+/// No fewer than the entries of each row.
+std::vector<uint32_t> RowBounds(const Mesh& mesh, Relation relation) {
+  std::vector<uint32_t> bounds(mesh.slots(relation.from).limit());
+  if (relation.to == EntityKind::kVertex) {
+    ForEachLive(mesh, EntityKind::kVertex, [&](Slot v) { bounds[v] = mesh.IncidentEdges(VertexId(v)).size(); });
+  } else {
+    ForEachEntry(mesh, relation, [&](Slot, Slot slot) { ++bounds[slot]; });
+  }
+  return bounds;
 }
 
 }  // namespace
 
 bool InverseRows::Pays(const Mesh& mesh, Relation relation) {
-  const bool upward = relation.to > relation.from && relation.to >= EntityKind::kFace;
-  const bool listed = Dimension(relation.to) == Dimension(relation.from) + 1;  // the mesh has these lists
-  const uint64_t most = uint64_t{mesh.NumLive(relation.to)} * kMaxElementEdges;
-  return upward && !listed && mesh.NumLive(relation.to) >= kFew && most < kNoSlot;
+  const bool listed = Dimension(relation.to) == Dimension(relation.from) + 1;  // the mesh has these rows as lists
+  const bool upward = relation.to > relation.from && !listed;
+  const bool vertices = relation.from == EntityKind::kVertex && relation.to == EntityKind::kVertex;
+  const EntityKind walked = vertices ? EntityKind::kEdge : relation.to;
+  const uint64_t most = uint64_t{mesh.NumLive(walked)} * kMaxElementEdges;
+  return (upward || vertices) && mesh.NumLive(relation.from) >= kFew && most < kMaxEntries;
 }
 
 InverseRows::InverseRows(const Mesh& mesh, Relation relation) {
-  const Slot limit = mesh.slots(relation.from).limit();
-  begin_.resize(size_t{limit} + 1);
-  ForEachRowBelow(mesh, relation, [&](Slot, absl::Span<const Slot> row) {
-    for (Slot lower : row) ++begin_[lower + 1];
-  });
-  for (Slot slot = 0; slot < limit; ++slot) begin_[slot + 1] += begin_[slot];
-  ids_ = std::make_unique_for_overwrite<Slot[]>(begin_[limit]);
-  end_.assign(begin_.begin(), begin_.end() - 1);
-  const bool plain = mesh.IsPlain();
-  ForEachRowBelow(mesh, relation, [&](Slot upper, absl::Span<const Slot> row) {
-    for (Slot lower : row) {
-      uint32_t& end = end_[lower];
-      // A degenerate element names what lies below it twice, one time after the other.
-      if (!plain && end != begin_[lower] && ids_[end - 1] == upper) continue;
-      ids_[end++] = upper;
-    }
-  });
+  const std::vector<uint32_t> bounds = RowBounds(mesh, relation);
+  begin_.resize(bounds.size());
+  uint32_t entries = 0;
+  for (size_t slot = 0; slot < bounds.size(); ++slot) {
+    begin_[slot] = entries;
+    entries += bounds[slot];
+  }
+  ids_ = std::make_unique_for_overwrite<Slot[]>(entries);
+  end_ = begin_;
+  if (relation.from == relation.to) {
+    ForEachEntry(mesh, relation, [&](Slot neighbor, Slot slot) {
+      if (neighbor != slot) Enter(end_[slot], begin_[slot], neighbor);
+    });
+  } else if (mesh.IsPlain()) {  // an element names nothing twice
+    ForEachEntry(mesh, relation, [&](Slot neighbor, Slot slot) { ids_[end_[slot]++] = neighbor; });
+  } else {
+    ForEachEntry(mesh, relation, [&](Slot neighbor, Slot slot) { Enter(end_[slot], begin_[slot], neighbor); });
+  }
 }
 
 }  // namespace dynmesh

@@ -10,15 +10,15 @@
 
 namespace dynmesh {
 
-/// All rows of an upward relation at once, as the inverse of the downward one: the upper entities are walked in
-/// ascending order and entered with what lies below them, so that rows come out sorted. Several times as fast as
-/// gathering row by row.
+/// All rows of a relation at once, by walking it backwards: the entities that rows hold are walked in ascending order
+/// and each is entered in the rows that it belongs to, so that rows come out sorted. Several times as fast as
+/// gathering and sorting row by row.
 ///
 /// Thread safety: that of std::vector.
 class InverseRows {
  public:
-  /// Whether this is the way to walk every row: vertex->cells, edge->cells and vertex->faces, where the mesh has
-  /// fewer than 2^32 incidences and more than a few entities.
+  /// Whether this is the way to walk every row: vertex->vertices, vertex->faces, vertex->cells and edge->cells, on
+  /// meshes that are not small. Other rows have so many entries that a walk in memory's order is dearer than sorting.
   static bool Pays(const Mesh& mesh, Relation relation);
 
   /// REQUIRES: Pays(mesh, relation). Cost: the incidences, and 4 bytes of memory for each.
@@ -29,6 +29,12 @@ class InverseRows {
   }
 
  private:
+  void Enter(uint32_t& end, uint32_t begin, Slot neighbor) {
+    // An entity that belongs to a row in two ways is met twice, one time after the other.
+    if (end != begin && ids_[end - 1] == neighbor) return;
+    ids_[end++] = neighbor;
+  }
+
   std::vector<uint32_t> begin_, end_;
   std::unique_ptr<Slot[]> ids_;
 };

@@ -24,9 +24,11 @@ class PooledLists {
   /// Of all lists together, with a margin for the room that size classes leave.
   static constexpr uint64_t kMaxEntries = 0xc0000000u;
 
+  /// So many entries can be read from the begin of each list, however short it is.
+  static constexpr size_t kReadable = 8;
+
   absl::Span<const T> Of(Slot slot) const {
-    if (slot >= lists_.size()) return {};
-    const List& list = lists_[slot];
+    const List& list = slot < lists_.size() ? lists_[slot] : kNoList;
     return absl::MakeConstSpan(pool_.data() + list.offset, list.length);
   }
   absl::Span<T> MutableOf(Slot slot) {
@@ -79,8 +81,8 @@ class PooledLists {
       offset += Capacity(lists_[i].size_class);
       longest_ = std::max(longest_, lengths[i]);
     }
-    pool_.reserve(offset + offset / 16);
-    pool_.resize(offset);
+    pool_.reserve(offset + offset / 16 + kReadable);
+    pool_.resize(offset + kReadable);
   }
 
   /// PushBack into a room made by Layout().
@@ -128,6 +130,8 @@ class PooledLists {
     uint32_t size_class : 6 = 0;
   };
 
+  static constexpr List kNoList = {};
+
   static uint32_t Capacity(uint32_t size_class) { return kCapacities[size_class]; }
 
   /// Small lists grow by two: each room that is left behind waits for another list to need its size.
@@ -159,13 +163,13 @@ class PooledLists {
       rooms.pop_back();
       return offset;
     }
-    const uint32_t offset = pool_.size();
+    const uint32_t offset = pool_.size() - kReadable;
     pool_.resize(pool_.size() + Capacity(size_class));
     return offset;
   }
 
   std::vector<List> lists_;
-  std::vector<T> pool_;
+  std::vector<T> pool_ = std::vector<T>(kReadable);  ///< rooms, then kReadable entries of none
   uint32_t longest_ = 0;  ///< length of the longest list so far
   std::array<std::vector<uint32_t>, kNumClasses> free_rooms_;
 };

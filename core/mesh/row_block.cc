@@ -94,6 +94,17 @@ class RowKernels {
     block_.size_ += ids.size();
   }
 
+  /// PushAll for a list of the mesh, most of which are short: eight entries at once, whatever there is of them.
+  template <typename Id>
+  void PushList(absl::Span<const Id> list) {
+    static_assert(sizeof(Id) == sizeof(Slot));
+    constexpr size_t kShort = PooledLists<Id>::kReadable;
+    Slot* const out = block_.Room(list.size());
+    std::memcpy(out, list.data(), kShort * sizeof(Slot));
+    if (list.size() > kShort) std::memcpy(out, list.data(), list.size() * sizeof(Slot));
+    block_.size_ += list.size();
+  }
+
   /// Sorts the row that began at `begin` and drops repeats.
   void Canonicalize(size_t begin) {
     block_.size_ = begin + SortUnique(block_.ids_.get() + begin, block_.size_ - begin);
@@ -118,7 +129,7 @@ class RowKernels {
       case EntityKind::kEdge:
         return ForEach(slots, [&](Slot v) {
           const size_t begin = block_.size_;
-          PushAll(mesh_.IncidentEdges(VertexId(v)));
+          PushList(mesh_.IncidentEdges(VertexId(v)));
           CanonicalizePlain(begin);
         });
       case EntityKind::kFace:
@@ -177,7 +188,7 @@ class RowKernels {
   void VertexFaces(VertexId v) {
     const size_t begin = block_.size_;
     if (!plain_) {
-      for (EdgeId e : mesh_.IncidentEdges(v)) PushAll(mesh_.IncidentFaces(e));
+      for (EdgeId e : mesh_.IncidentEdges(v)) PushList(mesh_.IncidentFaces(e));
       return Canonicalize(begin);
     }
     const auto corners = CornersAt(v);
@@ -231,13 +242,13 @@ class RowKernels {
       case EntityKind::kEdge:
         return ForEach(slots, [&](Slot e) {
           const size_t begin = block_.size_;
-          for (VertexId v : mesh_.edge_vertices_[e]) PushAll(mesh_.IncidentEdges(v));
+          for (VertexId v : mesh_.edge_vertices_[e]) PushList(mesh_.IncidentEdges(v));
           CanonicalizeWithout(begin, e);
         });
       case EntityKind::kFace:
         return ForEach(slots, [&](Slot e) {
           const size_t begin = block_.size_;
-          PushAll(mesh_.IncidentFaces(EdgeId(e)));
+          PushList(mesh_.IncidentFaces(EdgeId(e)));
           CanonicalizePlain(begin);
         });
       case EntityKind::kCell:
@@ -264,14 +275,14 @@ class RowKernels {
       case EntityKind::kFace:
         return ForEach(slots, [&](Slot f) {
           const size_t begin = block_.size_;
-          for (EdgeId e : mesh_.Edges(FaceId(f))) PushAll(mesh_.IncidentFaces(e));
+          for (EdgeId e : mesh_.Edges(FaceId(f))) PushList(mesh_.IncidentFaces(e));
           CanonicalizeWithout(begin, f);
         });
       case EntityKind::kCell:
         return ForEach(slots, [&](Slot f) {
           const size_t begin = block_.size_;
           PushAll(mesh_.IncidentCells(FaceId(f)));
-          Canonicalize(begin);
+          CanonicalizePlain(begin);
         });
     }
   }
@@ -289,8 +300,32 @@ class RowKernels {
           for (OrientedFace oriented : mesh_.Faces(CellId(c))) Push(oriented.face().slot());
         });
       case EntityKind::kCell:
-        return ForEach(slots, [&](Slot c) { CellCells(CellId(c)); });
+        return ForEach(slots, [&](Slot c) {
+          if (!plain_ || mesh_.Type(CellId(c)) != ElementType::kTetrahedron || !TetTets(c)) CellCells(CellId(c));
+        });
     }
+  }
+
+  /// The row of a tetrahedron whose faces have at most two cells each, in registers; false for others.
+  bool TetTets(Slot c) {
+    const OrientedFace* faces = &mesh_.cell_faces_[size_t{c} * mesh_.cell_face_stride_];
+    Slot row[4];
+    bool crowded = false;
+    Slot size = 0;
+    for (int i = 0; i < 4; ++i) {
+      const auto& uses = mesh_.face_cells_[faces[i].face().slot()];
+      const Slot first = uses[0].slot(), second = uses[1].slot();
+      crowded |= second == Mesh::kOverflow.slot();
+      row[i] = second == kNoSlot ? kNoSlot : first ^ second ^ c;
+      size += second != kNoSlot;
+    }
+    internal::SortFour(row);
+    bool repeats = false;
+    for (int i = 0; i < 3; ++i) repeats |= (row[i] == row[i + 1]) & (row[i] != kNoSlot);
+    if (crowded || repeats) return false;
+    std::memcpy(block_.Room(4), row, sizeof(row));
+    block_.size_ += size;
+    return true;
   }
 
   void CellCells(CellId c) {

@@ -62,15 +62,12 @@ inline void Exchange(Slot& a, Slot& b) {
   b = high;
 }
 
-/// REQUIRES: 2 <= count <= 4.
-inline void SortFew(Slot* values, size_t count) {
-  Slot v[4] = {values[0], values[1], count > 2 ? values[2] : kNoSlot, count > 3 ? values[3] : kNoSlot};
+inline void SortFour(Slot* v) {
   Exchange(v[0], v[1]);
   Exchange(v[2], v[3]);
   Exchange(v[0], v[2]);
   Exchange(v[1], v[3]);
   Exchange(v[1], v[2]);
-  std::copy_n(v, count, values);
 }
 
 }  // namespace internal
@@ -79,7 +76,7 @@ inline void SortFew(Slot* values, size_t count) {
 /// Cost: O(n log n); some ns for each eight pairs of a short list.
 inline void SortDistinct(Slot* values, size_t count) {
   if (count < 2 || internal::IsAscending(values, count)) return;
-  if (count <= 4) return internal::SortFew(values, count);
+  if (count == 2) return std::swap(values[0], values[1]);
   if (count > internal::kRankSorted) return std::sort(values, values + count);
   Slot sorted[internal::kRankSorted];
   internal::RankSort(values, count, sorted);
@@ -94,19 +91,13 @@ inline size_t SortUnique(Slot* values, size_t count, Slot self = kNoSlot) {
     std::sort(values, end);
     return std::unique(values, end) - values;
   }
-  if (count == 0) return 0;
-  Slot few[4];
-  Slot many[internal::kRankSorted];
-  const Slot* sorted = few;
-  if (count <= 4) {
-    std::copy_n(values, count, few);
-    if (count > 1) internal::SortFew(few, count);
-    for (size_t i = 1; i < count; ++i) {
-      if (few[i] == few[i - 1]) few[i - 1] = self;
-    }
+  Slot sorted[internal::kRankSorted];
+  if (count > 4) {
+    internal::RankSort(values, count, sorted);
   } else {
-    internal::RankSort(values, count, many);
-    sorted = many;
+    std::fill_n(std::copy_n(values, count, sorted), 4 - count, kNoSlot);
+    internal::SortFour(sorted);
+    for (int i = 3; i > 0; --i) sorted[i] = sorted[i] == sorted[i - 1] ? kNoSlot : sorted[i];
   }
   size_t kept = 0;
   for (size_t i = 0; i < count; ++i) {

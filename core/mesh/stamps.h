@@ -66,6 +66,20 @@ class StampColumn {
     }
   }
 
+  /// How many slots of [begin, end) have a stamp greater than `since`. Cost: as ForEachSince.
+  size_t CountSince(Stamp since, Slot begin, Slot end) const {
+    size_t count = 0;
+    end = std::min<Slot>(end, stamps_.size());
+    for (Slot slot = begin; slot < end;) {
+      const Slot page_end = std::min<Slot>(end, (slot / kPageSlots + 1) * kPageSlots);
+      if (page_max_[slot / kPageSlots] > since) {
+        for (Slot s = slot; s < page_end; ++s) count += stamps_[s] > since;
+      }
+      slot = page_end;
+    }
+    return count;
+  }
+
   /// No fewer than the slots whose stamp is greater than `since`: whole pages. Cost: O(pages).
   size_t BoundSince(Stamp since) const {
     const auto pages = std::count_if(page_max_.begin(), page_max_.end(), [&](Stamp max) { return max > since; });

@@ -3,6 +3,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <random>
+#include <set>
+
 #include "core/mesh/validate.h"
 #include "tests/support/meshes.h"
 #include "tests/support/oracle.h"
@@ -34,6 +38,92 @@ TEST(TransactionTest, ABatchIsOneRevisionAndMayUseItsOwnVertices) {
   EXPECT_EQ(mesh.Position(VertexId(4))[0], 5);
   EXPECT_EQ(result->checksum, mesh.checksum());
   EXPECT_THAT(result->counts, ElementsAre(6, 9, 7, 2));
+}
+
+/// All cells of a mesh as one edit that adds them.
+AddElementsEdit AllCells(const Mesh& mesh) {
+  AddElementsEdit edit{ElementType::kTetrahedron, {}};
+  mesh.slots(EntityKind::kCell).live().ForEach([&](Slot c) {
+    for (VertexId v : mesh.Vertices(CellId(c))) edit.vertices.push_back(v.slot());
+  });
+  return edit;
+}
+
+TEST(TransactionTest, ManyItemsGetSlotsInSpatialOrderAndAnswersInTheirOwn) {
+  const Mesh source = TetGrid(5, 5, 5);
+  AddVerticesEdit vertices;
+  for (Slot v = 0; v < source.NumLive(EntityKind::kVertex); ++v) vertices.positions.push_back(source.Position(VertexId(v)));
+  AddElementsEdit cells = AllCells(source);
+  for (Slot& v : cells.vertices) v |= kNewVertex;
+  Mesh mesh;
+  const auto result = ApplyBatch(mesh, {vertices, cells}, {});
+  ASSERT_TRUE(result.ok()) << result.status();
+  const auto& new_vertices = result->results[0].new_slots;
+  const auto& new_cells = result->results[1].new_slots;
+  ASSERT_EQ(new_vertices.size(), vertices.positions.size());
+  ASSERT_EQ(new_cells.size(), cells.vertices.size() / 4);
+  EXPECT_FALSE(std::is_sorted(new_vertices.begin(), new_vertices.end()));
+  for (size_t i = 0; i < new_vertices.size(); ++i) {
+    EXPECT_EQ(mesh.Position(VertexId(new_vertices[i])), vertices.positions[i]);
+  }
+  for (size_t i = 0; i < new_cells.size(); ++i) {
+    for (int k = 0; k < 4; ++k) {
+      EXPECT_EQ(mesh.Vertices(CellId(new_cells[i]))[k].slot(), new_vertices[cells.vertices[4 * i + k] & ~kNewVertex]);
+    }
+  }
+  ExpectEqualsOracle(mesh, ModelOf(mesh));
+}
+
+TEST(TransactionTest, RemovingAndAddingManyCellsInAnyOrderGivesTheSameMesh) {
+  Mesh mesh = TetGrid(4, 4, 4);
+  const ElementModel before = ModelOf(mesh);
+  std::vector<Slot> doomed;
+  AddElementsEdit again{ElementType::kTetrahedron, {}};
+  for (Slot c = 0; c < mesh.NumLive(EntityKind::kCell); c += 2) doomed.push_back(c);
+  std::shuffle(doomed.begin(), doomed.end(), std::mt19937(3));
+  for (Slot c : doomed) {
+    for (VertexId v : mesh.Vertices(CellId(c))) again.vertices.push_back(v.slot());
+  }
+  ASSERT_TRUE(ApplyBatch(mesh, {RemoveElementsEdit{EntityKind::kCell, doomed}}, {}).ok());
+  EXPECT_EQ(mesh.NumLive(EntityKind::kCell), before.elements.size() - doomed.size());
+  ExpectEqualsOracle(mesh, ModelOf(mesh));
+  const auto result = ApplyBatch(mesh, {again}, {});
+  ASSERT_TRUE(result.ok());
+  EXPECT_THAT(result->duplicate, IsEmpty());
+  EXPECT_EQ(ModelOf(mesh).elements.size(), before.elements.size());
+  ExpectEqualsOracle(mesh, ModelOf(mesh));
+}
+
+TEST(TransactionTest, OfEqualCellsInALargeBatchAllButTheFirstAreDuplicates) {
+  Mesh mesh = TetGrid(3, 3, 3);
+  AddElementsEdit twice = AllCells(mesh);
+  const size_t count = mesh.NumLive(EntityKind::kCell);
+  std::vector<Slot> all(count);
+  for (Slot c = 0; c < count; ++c) all[c] = c;
+  ASSERT_TRUE(ApplyBatch(mesh, {RemoveElementsEdit{EntityKind::kCell, all}}, {}).ok());
+  twice.vertices.insert(twice.vertices.end(), twice.vertices.begin(), twice.vertices.end());
+  const auto result = ApplyBatch(mesh, {twice}, {});
+  ASSERT_TRUE(result.ok());
+  const auto& slots = result->results[0].new_slots;
+  std::set<Slot> second(slots.begin() + count, slots.end()), reported;
+  for (EntityId id : result->duplicate) reported.insert(id.slot);
+  EXPECT_EQ(reported, second);
+}
+
+TEST(TransactionTest, ALargeEditThatIsRefusedSaysWhichItem) {
+  Mesh mesh = TetGrid(3, 3, 3);
+  const std::string before = Describe(mesh);
+  AddElementsEdit cells = AllCells(mesh);
+  cells.vertices[4 * 77 + 2] = 100'000;
+  auto status = ApplyBatch(mesh, {cells}, {}).status();
+  EXPECT_EQ(Metadata(status, "index"), "77");
+  std::vector<Slot> doomed(100);
+  for (Slot i = 0; i < 100; ++i) doomed[i] = 99 - i;
+  doomed[60] = doomed[20];
+  status = ApplyBatch(mesh, {RemoveElementsEdit{EntityKind::kCell, doomed}}, {}).status();
+  EXPECT_EQ(ErrorReason(status), reason::kEntityRemoved);
+  EXPECT_EQ(Metadata(status, "index"), "60");
+  EXPECT_EQ(Describe(mesh), before);
 }
 
 TEST(TransactionTest, ARefusedBatchChangesNothingAndSaysWhere) {

@@ -39,6 +39,42 @@ TEST(BitSetTest, BehavesLikeASortedSet) {
   EXPECT_EQ(listed, std::vector<Slot>(model.begin(), model.end()));
 }
 
+TEST(BitSetTest, ListsAndCollectsItsMembersWhateverTheirDensity) {
+  std::mt19937 rng(5);
+  for (int one_in : {1, 2, 9, 300, 20000}) {
+    BitSet set;
+    std::vector<Slot> expected;
+    for (Slot slot = 0; slot < 50000; ++slot) {
+      if (rng() % one_in != 0) continue;
+      set.Set(slot);
+      expected.push_back(slot);
+    }
+    std::vector<Slot> members = {7};
+    set.ListMembers(members);
+    EXPECT_EQ(members, expected) << "one in " << one_in;
+    for (size_t step : {1u, 63u, 64u, 65u, 1000u}) {
+      std::vector<Slot> collected;
+      std::vector<Slot> part(step);
+      for (Slot next = 0; const size_t count = set.Collect(next, part.data(), step); next = part[count - 1] + 1) {
+        collected.insert(collected.end(), part.begin(), part.begin() + count);
+      }
+      ASSERT_EQ(collected, expected) << "one in " << one_in << " step " << step;
+    }
+  }
+}
+
+TEST(BitSetTest, FillMakesTheFirstOnes) {
+  for (Slot count : {0u, 1u, 63u, 64u, 65u, 4096u, 5000u}) {
+    BitSet set;
+    set.Fill(count);
+    EXPECT_EQ(set.size(), count);
+    EXPECT_EQ(set.Next(count), kNoSlot);
+    EXPECT_EQ(set.Next(0), count == 0 ? kNoSlot : 0);
+    set.Set(count);
+    EXPECT_EQ(set.Next(count), count);
+  }
+}
+
 TEST(SlotsTest, LowestFreeSlotIsReusedOnlyAfterQuarantine) {
   Slots slots;
   for (Slot expected = 0; expected < 4; ++expected) EXPECT_EQ(slots.Allocate(1).slot, expected);

@@ -61,7 +61,7 @@ TEST(RelationsTest, RowsInBlocksAreThoseOfEachAlone) {
 }
 
 TEST(RelationsTest, BlocksLongerThanOneGoOnWhereTheLastEnded) {
-  const Mesh mesh = TetGrid(6, 6, 6);
+  const Mesh mesh = TetGrid(9, 9, 9);
   std::vector<Slot> slots;
   for (Slot v = mesh.slots(EntityKind::kVertex).limit(); v-- > 0;) slots.push_back(v);
   ASSERT_GT(slots.size(), 2 * RowBlock::kMaxRows);
