@@ -32,7 +32,7 @@ void ImportReactor::OnReadDone(bool ok) {
 }
 
 void ImportReactor::Post(Executor& executor, void (ImportReactor::*step)()) {
-  const absl::Status posted = executor.TryPost([this, step] { (this->*step)(); });
+  const absl::Status posted = executor.TryPost([this, step] { (this->*step)(); }, request_.ByteSizeLong());
   if (!posted.ok()) EndWith(posted);
 }
 

@@ -26,12 +26,18 @@ struct Limits {
   uint64_t max_message_bytes = uint64_t{4} << 20;
   /// One answer of a query or export, which is gathered in memory so that it speaks of one revision.
   uint64_t max_query_bytes = uint64_t{512} << 20;
+  /// What one query or export may look at: entities, and entries of incidence lists; about ten nanoseconds each.
+  uint64_t max_query_steps = 1'000'000'000;
+  /// All answers of queries and exports that are gathered and wait to be read.
+  uint64_t max_answer_bytes = uint64_t{2} << 30;
   /// Subscriptions of one session.
   uint32_t max_followers = 1000;
   /// Imports that are receiving or building.
   uint32_t max_concurrent_imports = 4;
-  /// Calls that wait for a thread.
+  /// Calls that wait for a thread or for their session, and the bytes of their requests; for each of the two
+  /// pools of threads.
   uint32_t max_queued_tasks = 10'000;
+  uint64_t max_queued_bytes = uint64_t{256} << 20;
 
   uint32_t max_slots(EntityKind kind) const {
     const uint32_t slots[] = {max_vertices, max_edges, max_faces, max_cells};

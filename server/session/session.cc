@@ -22,9 +22,9 @@ constexpr size_t kMaxNameBytes = 64;
 // A mesh is measured after so many new items, not for each batch.
 constexpr uint64_t kItemsBetweenChecks = 1000;
 
-uint64_t RandomId() {
+std::string RandomUid() {
   std::random_device device;
-  return uint64_t{device()} << 32 | device();
+  return absl::StrCat(absl::Hex(uint64_t{device()} << 32 | device(), absl::kZeroPad16));
 }
 
 uint64_t FingerprintOf(absl::Span<const Edit> edits, const ApplyOptions& options) {
@@ -76,7 +76,7 @@ absl::Status CheckSessionName(absl::string_view name) {
 
 Session::Session(const Options& options)
     : options_(options),
-      creation_id_(RandomId()),
+      uid_(RandomUid()),
       create_time_(absl::Now()),
       mesh_(MeshOptions{options.settings.duplicates, ToMeshLimits(options.limits)}),
       commit_time_(create_time_),
@@ -98,6 +98,7 @@ absl::StatusOr<SessionInfo> Session::Info() const {
 SessionInfo Session::Describe(const Mesh& mesh, const MeshSummary& summary, absl::Time update_time) const {
   SessionInfo info = DescribeMesh(mesh, summary);
   info.name = name();
+  info.uid = uid();
   info.settings = settings();
   info.etag = EtagAt(info.revision);
   info.create_time = create_time_;
@@ -186,22 +187,19 @@ Session::AnswerPtr Session::Unchanged() const {
 void Session::Committed() {
   commit_time_ = absl::Now();
   revision_.store(mesh_.revision());
+  for (EntityKind kind : kEntityKinds) num_live_[Dimension(kind)].store(mesh_.NumLive(kind));
 }
 
 absl::Status Session::CheckEmpty() const {
-  ReaderMutexLock lock(&mu_);
-  return CheckEmptyLocked();
-}
-
-absl::Status Session::CheckEmptyLocked() const {
-  DYNMESH_RETURN_IF_ERROR(gone_);
-  return mesh_.revision() == 0 ? absl::OkStatus() : SessionNotEmpty(name(), mesh_.revision());
+  return revision() == 0 ? absl::OkStatus() : SessionNotEmpty(name(), revision());
 }
 
 absl::Status Session::Adopt(Mesh& mesh) {
   {
+    DYNMESH_RETURN_IF_ERROR(CheckEmpty());  // else the lock may be busy for long
     WriterMutexLock lock(&mu_);
-    DYNMESH_RETURN_IF_ERROR(CheckEmptyLocked());
+    DYNMESH_RETURN_IF_ERROR(gone_);
+    DYNMESH_RETURN_IF_ERROR(CheckEmpty());
     std::swap(mesh_, mesh);
     Committed();
   }
@@ -211,14 +209,13 @@ absl::Status Session::Adopt(Mesh& mesh) {
 
 absl::StatusOr<std::shared_ptr<const ImportOutcome>> Session::FindImport(absl::string_view request_id,
                                                                          uint64_t fingerprint) const {
-  ReaderMutexLock lock(&mu_);
-  DYNMESH_RETURN_IF_ERROR(gone_);
+  MutexLock lock(&imports_mu_);
   return imports_.Find(request_id, fingerprint);
 }
 
 void Session::RememberImport(const std::string& request_id, uint64_t fingerprint,
                              std::shared_ptr<const ImportOutcome> outcome) {
-  WriterMutexLock lock(&mu_);
+  MutexLock lock(&imports_mu_);
   imports_.Remember(request_id, fingerprint, std::move(outcome), 0);
 }
 
@@ -235,7 +232,7 @@ absl::StatusOr<int64_t> Session::Delete(absl::string_view etag) {
 }
 
 std::string Session::EtagAt(int64_t revision) const {
-  return absl::StrCat(absl::Hex(creation_id_, absl::kZeroPad16), "-", revision);
+  return absl::StrCat(uid_, "-", revision);
 }
 
 }  // namespace dynmesh

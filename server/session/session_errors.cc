@@ -18,6 +18,8 @@ absl::Status ShuttingDown() {
 
 absl::Status CallCancelled() { return absl::CancelledError("the call was cancelled"); }
 
+absl::Status DeadlinePassed() { return absl::DeadlineExceededError("the call's deadline passed"); }
+
 absl::Status RevisionInFuture(int64_t requested, int64_t actual) {
   return MakeError(absl::StatusCode::kOutOfRange, reason::kRevisionInFuture,
                    absl::StrCat("revision ", requested, " is in the future: the session is at ", actual),

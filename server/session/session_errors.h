@@ -15,8 +15,11 @@ absl::Status OutOfMemory();
 /// UNAVAILABLE SHUTTING_DOWN.
 absl::Status ShuttingDown();
 
-/// CANCELLED: the peer went away or its deadline passed.
+/// CANCELLED: the peer went away, or the server has no more time for the call.
 absl::Status CallCancelled();
+
+/// DEADLINE_EXCEEDED: the call's deadline passed.
+absl::Status DeadlinePassed();
 
 /// OUT_OF_RANGE REVISION_IN_FUTURE, metadata requested and actual.
 absl::Status RevisionInFuture(int64_t requested, int64_t actual);
