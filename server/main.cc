@@ -50,7 +50,8 @@ ABSL_FLAG(uint32_t, max_vertices, dynmesh::Limits().max_vertices, "Vertices of a
 ABSL_FLAG(uint32_t, max_edges, dynmesh::Limits().max_edges, "Edges of a session, derived ones included");
 ABSL_FLAG(uint32_t, max_faces, dynmesh::Limits().max_faces, "Faces of a session, derived ones included");
 ABSL_FLAG(uint32_t, max_cells, dynmesh::Limits().max_cells, "Cells of a session");
-ABSL_FLAG(uint64_t, max_session_bytes, dynmesh::Limits().max_session_bytes, "Memory of a session's mesh");
+ABSL_FLAG(uint64_t, max_session_bytes, dynmesh::Limits().max_session_bytes,
+          "Memory of a session's mesh; by default the smaller of 64 GiB and 3/4 of the machine's memory");
 ABSL_FLAG(uint64_t, max_batch_edits, dynmesh::Limits().max_batch_edits, "Edits in a batch");
 ABSL_FLAG(uint64_t, max_batch_items, dynmesh::Limits().max_batch_items,
           "Vertices, elements and rows that the edits of a batch name");
@@ -62,6 +63,10 @@ ABSL_FLAG(uint64_t, max_answer_bytes, dynmesh::Limits().max_answer_bytes,
           "All answers of queries and exports that wait to be read");
 ABSL_FLAG(uint32_t, max_followers, dynmesh::Limits().max_followers, "Subscriptions of a session");
 ABSL_FLAG(uint32_t, max_concurrent_imports, dynmesh::Limits().max_concurrent_imports, "Imports at once");
+ABSL_FLAG(uint64_t, max_staged_bytes, dynmesh::Limits().max_staged_bytes,
+          "What imports have received and not built yet, all together");
+ABSL_FLAG(absl::Duration, import_idle_timeout, dynmesh::Limits().import_idle_timeout,
+          "How long an import may send nothing");
 ABSL_FLAG(uint32_t, max_queued_tasks, dynmesh::Limits().max_queued_tasks,
           "Calls that wait for a thread or for their session, for each of the two pools of threads");
 ABSL_FLAG(uint64_t, max_queued_bytes, dynmesh::Limits().max_queued_bytes, "Requests of the calls that wait");
@@ -123,6 +128,8 @@ Limits LimitsFromFlags() {
   limits.max_answer_bytes = absl::GetFlag(FLAGS_max_answer_bytes);
   limits.max_followers = absl::GetFlag(FLAGS_max_followers);
   limits.max_concurrent_imports = absl::GetFlag(FLAGS_max_concurrent_imports);
+  limits.max_staged_bytes = absl::GetFlag(FLAGS_max_staged_bytes);
+  limits.import_idle_timeout = absl::GetFlag(FLAGS_import_idle_timeout);
   limits.max_queued_tasks = absl::GetFlag(FLAGS_max_queued_tasks);
   limits.max_queued_bytes = absl::GetFlag(FLAGS_max_queued_bytes);
   return limits;

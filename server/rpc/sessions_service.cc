@@ -210,8 +210,8 @@ class SessionsService final : public v1::SessionService::CallbackService {
   }
 
   grpc::ServerBidiReactor<v1::ImportMeshRequest, v1::ImportMeshResponse>* ImportMesh(
-      grpc::CallbackServerContext*) override {
-    return (new ImportReactor(services_))->Start();
+      grpc::CallbackServerContext* context) override {
+    return (new ImportReactor(services_, context))->Start();
   }
 
   grpc::ServerWriteReactor<v1::ExportMeshResponse>* ExportMesh(

@@ -125,6 +125,7 @@ absl::StatusOr<PayloadPtr> DeltaSource::Make(const DeltaKey& key, AccessGrant& g
   EncodeOptions options;
   options.codec = key.codec;
   auto payload = std::make_shared<Payload>();
+  payload->session_uid = session_.uid();
   payload->next = key.cursor;
   DYNMESH_RETURN_IF_ERROR(session_.Read([&](const SessionView& view) {
     const Mesh& mesh = view.mesh;

@@ -26,6 +26,7 @@ struct SessionView;
 
 /// An encoded delta and what a follower needs to know of it. Shared by all followers that ask for the same.
 struct Payload {
+  std::string session_uid;
   int64_t from_revision = 0;
   int64_t revision = 0;    ///< of the session when it was made
   bool consistent = true;  ///< false: one part of a longer answer

@@ -29,7 +29,7 @@ class SessionRegistry {
   SessionRegistry(const Limits& limits, const Workers& workers)
       : limits_(limits),
         workers_(workers),
-        import_gate_(limits.max_concurrent_imports),
+        import_gate_(limits),
         answer_budget_(std::make_shared<Budget>("max_answer_bytes", limits.max_answer_bytes)) {}
 
   /// Makes an empty session. The same request_id with the same name and settings: what the first call gave.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <map>
 #include <random>
 #include <utility>
 #include <variant>
@@ -21,6 +22,7 @@ namespace {
 constexpr size_t kMaxNameBytes = 64;
 // A mesh is measured after so many new items, not for each batch.
 constexpr uint64_t kItemsBetweenChecks = 1000;
+constexpr uint64_t kBytesBetweenChecks = 64 << 10;
 
 std::string RandomUid() {
   std::random_device device;
@@ -45,6 +47,33 @@ size_t BytesOf(const BatchResult& result) {
 bool Grows(const Edit& edit) {
   return std::holds_alternative<AddVerticesEdit>(edit) || std::holds_alternative<AddElementsEdit>(edit) ||
          std::holds_alternative<AddAttributeEdit>(edit) || std::holds_alternative<SetAttributeEdit>(edit);
+}
+
+/// Bytes that the rows which `edits` set would add. A row at a far slot takes a page, so that is much more than
+/// what arrives.
+uint64_t AttributeGrowth(const Mesh& mesh, absl::Span<const Edit> edits) {
+  struct Rows {
+    const AttributeSpec* spec = nullptr;
+    std::vector<Slot> slots;
+  };
+  std::map<std::pair<EntityKind, std::string>, Rows> columns;
+  for (const Edit& edit : edits) {
+    const auto* set = std::get_if<SetAttributeEdit>(&edit);
+    if (set == nullptr) continue;
+    Rows& rows = columns[{set->spec.kind, set->spec.name}];
+    rows.spec = &set->spec;
+    const Slot limit = mesh.slots(set->spec.kind).limit();
+    for (Slot slot : set->slots) {
+      if (slot < limit) rows.slots.push_back(slot);  // others are refused
+    }
+  }
+  uint64_t bytes = 0;
+  for (const auto& [key, rows] : columns) {
+    const int index = mesh.FindAttribute(key.second, key.first);
+    const AttributeColumn fresh(*rows.spec);
+    bytes += (index < 0 ? fresh : mesh.attributes()[index]).BytesToSet(rows.slots);
+  }
+  return bytes;
 }
 
 absl::Status CheckBatchSize(absl::Span<const Edit> edits, const Limits& limits) {
@@ -167,8 +196,9 @@ absl::Status Session::CheckRevisions(const ApplyOptions& options) const {
 absl::Status Session::CheckMemory(absl::Span<const Edit> edits) {
   if (std::none_of(edits.begin(), edits.end(), Grows)) return absl::OkStatus();
   for (const Edit& edit : edits) items_since_check_ += NumItems(edit);
-  if (items_since_check_ < kItemsBetweenChecks) return absl::OkStatus();
-  const uint64_t bytes = mesh_.memory_bytes();
+  const uint64_t growth = AttributeGrowth(mesh_, edits);
+  if (items_since_check_ < kItemsBetweenChecks && growth < kBytesBetweenChecks) return absl::OkStatus();
+  const uint64_t bytes = mesh_.memory_bytes() + growth;
   if (bytes > limits().max_session_bytes) {
     return LimitExceeded("max_session_bytes", limits().max_session_bytes, bytes);
   }

@@ -42,6 +42,20 @@ absl::Status SessionDeleted(absl::string_view name) {
                    absl::StrCat("session ", name, " has been deleted"), {{"session", std::string(name)}});
 }
 
+absl::Status SessionRecreated(absl::string_view name, absl::string_view expected, absl::string_view actual) {
+  return MakeError(absl::StatusCode::kAborted, reason::kSessionRecreated,
+                   absl::StrCat("session ", name, " was deleted, and another one has its name"),
+                   {{"session", std::string(name)},
+                    {"expected", std::string(expected)},
+                    {"actual", std::string(actual)}});
+}
+
+absl::Status ImportIdle(absl::Duration timeout) {
+  return MakeError(absl::StatusCode::kDeadlineExceeded, reason::kImportIdle,
+                   absl::StrCat("nothing of the import arrived for ", absl::FormatDuration(timeout)),
+                   {{"limit", "import_idle_timeout"}});
+}
+
 absl::Status SessionDamaged(absl::string_view name) {
   return MakeError(absl::StatusCode::kDataLoss, reason::kInternal,
                    absl::StrCat("an edit of session ", name, " failed half way; delete the session"),
