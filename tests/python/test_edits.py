@@ -42,6 +42,31 @@ def test_ids_beside_handles_stay_as_they_are(session):
     assert tx.result.resolve([[0, 1, new[0]]]).tolist() == [[0, 1, 4]]
 
 
+def test_a_handle_of_another_batch_is_refused(session):
+    with session.edit() as tx:
+        old = tx.add_vertices(TET)
+        tx.add_elements("tetra", [old])
+    for use in (
+        lambda batch: batch.add_elements("tetra", [old]),
+        lambda batch: batch.add_elements("line", [[0, old[3]]]),
+        lambda batch: batch.move_vertices(old[:1], [[0, 0, 0]]),
+        lambda batch: batch.remove_vertices(old),
+        lambda batch: batch.set_attribute("t", "vertex", old[:1], [1.0]),
+    ):
+        batch = EditBatch()
+        batch.add_vertices(TET)
+        with pytest.raises(dynmesh.InvalidArgumentError, match="FOREIGN_HANDLE"):
+            use(batch)
+    with session.edit() as other:
+        other.add_vertices(TET)
+    with pytest.raises(dynmesh.InvalidArgumentError, match="FOREIGN_HANDLE") as caught:
+        other.result.resolve([[1, 2], [3, old[0]]])
+    assert caught.value.metadata == {"index": "3"}
+    with pytest.raises(dynmesh.InvalidArgumentError):
+        session.positions(old)
+    assert tx.result.resolve(old).tolist() == [0, 1, 2, 3]
+
+
 def test_an_exception_in_the_block_sends_nothing(session):
     with pytest.raises(ZeroDivisionError):
         with session.edit() as tx:

@@ -47,6 +47,14 @@ def as_points(values: ArrayLike, what: str = "positions") -> Points:
     return points.astype(np.float64, copy=False)
 
 
+def as_integers(values: ArrayLike) -> NDArray[np.int64] | None:
+    """`values` as int64 of any shape; None for what are no such integers."""
+    array = _as_array(values, "ids")
+    if array.size == 0 or array.dtype.kind not in "iu" or (array.dtype == np.uint64 and (array >> 63).any()):
+        return None
+    return array.astype(np.int64, copy=False)
+
+
 def u32_bytes(values: Ids) -> bytes:
     """Bytes of a u32[n] field."""
     return values.astype("<u4", copy=False).tobytes()
