@@ -125,6 +125,28 @@ def test_a_batch_beyond_the_limit_is_refused_by_the_name_of_the_limit(session):
     assert session.revision == 0
 
 
+def test_what_grpc_would_refuse_is_not_sent(daemon, session):
+    batch = EditBatch()
+    batch.add_vertices(np.zeros((750_000, 3)))  # 18 MB; up to 16 MiB the server says it by itself
+
+    def check(call):
+        with pytest.raises(dynmesh.ResourceExhaustedError, match="LIMIT_EXCEEDED") as caught:
+            call()
+        assert caught.value.metadata["limit"] == "max_message_bytes"
+        assert int(caught.value.metadata["requested"]) > 18_000_000
+
+    check(lambda: session.apply(batch))
+    with session.edit_stream() as stream:
+        good = stream.submit(tet_batch())
+        check(lambda: stream.submit(batch))
+        assert stream.submit(tet_batch(1.0)).result().revision == 2  # the stream goes on
+    assert good.result().revision == 1
+    with daemon.connect(max_message_bytes=1000) as client:
+        with pytest.raises(dynmesh.ResourceExhaustedError, match="max_message_bytes"):
+            client.session(session.name).import_mesh(np.zeros((400, 3)), {})
+    assert session.revision == 2
+
+
 def test_if_revision_refuses_when_somebody_was_faster(session):
     session.import_mesh(TET, {})
     with session.edit(if_revision=1) as tx:

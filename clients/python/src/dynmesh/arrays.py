@@ -21,6 +21,13 @@ def as_ids(values: ArrayLike, what: str = "ids") -> Ids:
     return _as_uint32(values, what, ndim=1)
 
 
+def as_int64(value: int, what: str) -> int:
+    """`value` for an int64 field. Raises `InvalidArgumentError` for what does not fit."""
+    if isinstance(value, (int, np.integer)) and not isinstance(value, bool) and -(2**63) <= value < 2**63:
+        return int(value)
+    raise InvalidArgumentError(f"{what} is no 64-bit integer: {value!r}", reason="BAD_ARGUMENT", metadata={"field": what})
+
+
 def as_id_rows(values: ArrayLike, width: int, what: str) -> Ids:
     """`values` as uint32[n, width]; an empty list is no rows."""
     rows = _as_uint32(values, what, ndim=None)

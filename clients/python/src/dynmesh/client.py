@@ -8,7 +8,7 @@ from types import TracebackType
 
 import grpc
 
-from ._calls import Caller
+from ._calls import DEFAULT_MAX_MESSAGE_BYTES, Caller
 from .errors import InvalidArgumentError
 from .info import SessionInfo, info_from_proto
 from .session import Session
@@ -21,7 +21,7 @@ _PAGE_SIZE = 1000
 _POLICIES = {"keep": sessions_pb2.DUPLICATE_POLICY_KEEP, "refuse": sessions_pb2.DUPLICATE_POLICY_REFUSE}
 _CHANNEL_OPTIONS = (
     ("grpc.max_receive_message_length", -1),  # deltas are as large as the server's own limit allows
-    ("grpc.max_send_message_length", -1),  # the server refuses what is too large, and says so
+    ("grpc.max_send_message_length", -1),  # Caller.check_size and the server refuse what is too large
     ("grpc.keepalive_time_ms", 30_000),  # a mirror learns of a peer that vanished; the server allows it
     ("grpc.keepalive_timeout_ms", 10_000),
     ("grpc.http2.max_pings_without_data", 0),
@@ -37,10 +37,10 @@ class Client:
     Thread safety: everything may be called from any thread.
     """
 
-    def __init__(self, target: str, timeout: float, retries: int) -> None:
+    def __init__(self, target: str, timeout: float, retries: int, max_message_bytes: int) -> None:
         self.target = target
         self._channel = grpc.insecure_channel(target, options=_CHANNEL_OPTIONS)
-        self._caller = Caller(timeout, retries)
+        self._caller = Caller(timeout, retries, max_message_bytes)
         self._sessions = sessions_pb2_grpc.SessionServiceStub(self._channel)
 
     def __repr__(self) -> str:
@@ -111,7 +111,13 @@ class Client:
         return self.session(name).delete(etag=etag, timeout=timeout)
 
 
-def connect(target: str = DEFAULT_TARGET, *, timeout: float = DEFAULT_TIMEOUT_S, retries: int = 2) -> Client:
+def connect(
+    target: str = DEFAULT_TARGET,
+    *,
+    timeout: float = DEFAULT_TIMEOUT_S,
+    retries: int = 2,
+    max_message_bytes: int = DEFAULT_MAX_MESSAGE_BYTES,
+) -> Client:
     """Attaches to a daemon. Returns at once: the first call finds out whether one is there.
 
     Parameters
@@ -122,5 +128,8 @@ def connect(target: str = DEFAULT_TARGET, *, timeout: float = DEFAULT_TIMEOUT_S,
         Seconds that a call may take unless it says otherwise; ``float("inf")`` for no limit.
     retries : int
         How often reading calls, and edits by their request ids, are repeated when nobody answers.
+    max_message_bytes : int
+        The server's flag of that name, where it is not the default. A request of more than four times that is
+        not sent, because gRPC would refuse it at the other end without saying why.
     """
-    return Client(target, timeout, retries)
+    return Client(target, timeout, retries, max_message_bytes)

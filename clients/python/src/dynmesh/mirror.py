@@ -96,6 +96,7 @@ class Mirror:
         self._last: Update | None = None
         self._pending_bytes = 0
         self._synced = True
+        self._confirmed = state.revision == 0  # else the server has yet to say that the session is still that one
         self._starting_over = False
         self._closed = False
         self._error: DynmeshError | None = None
@@ -228,7 +229,7 @@ class Mirror:
             return self._state
 
     def _is_at(self, revision: int) -> bool:
-        return self._synced and self._state.revision >= revision
+        return self._synced and self._confirmed and self._state.revision >= revision
 
     def _ended(self) -> bool:
         return self._closed or self._error is not None
@@ -292,4 +293,5 @@ class _MirrorSink:
         self._mirror._synced = False  # until all are applied and verified
         for delta in deltas:
             self._mirror._state.apply(delta)
-        self._mirror._synced, self._mirror._starting_over = True, False
+        self._mirror._synced = self._mirror._confirmed = True
+        self._mirror._starting_over = False
