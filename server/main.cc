@@ -40,7 +40,8 @@ ABSL_FLAG(absl::Duration, drain_timeout, absl::Seconds(10),
           "How long calls under way may go on after SIGTERM or SIGINT; the daemon ends at most 5 s later");
 ABSL_FLAG(bool, exit_with_parent, false, "Drain and exit when the process that started this one ends");
 ABSL_FLAG(std::string, health_check, "",
-          "Do not serve: ask the server at this gRPC target for its health, and exit with 0 or 1");
+          "Do not serve: ask the server at this gRPC target for its health, and exit with 0 or 1. \"self\": where "
+          "one with the other flags and the same environment serves");
 ABSL_FLAG(int32_t, quick_threads, 0, "Threads for edits and small queries; 0: four for each processor, at least 8");
 ABSL_FLAG(int32_t, heavy_threads, 0,
           "Threads for imports, exports, validation and large queries; 0: four more than max_concurrent_imports");
@@ -176,7 +177,12 @@ bool TieToParent() {
   return prctl(PR_SET_PDEATHSIG, SIGTERM) == 0 && getppid() == parent;
 }
 
-int CheckHealth(const std::string& target) {
+int CheckHealth(std::string target) {
+  if (target == "self") target = ProbeTarget(absl::GetFlag(FLAGS_listen), absl::GetFlag(FLAGS_unix_socket));
+  if (target.empty()) {
+    std::cerr << "dynmeshd: --health_check=self needs an address with a port, or a unix socket\n";
+    return EXIT_FAILURE;
+  }
   const absl::Status status = ProbeHealth(target, kHealthTimeout);
   if (!status.ok()) std::cerr << "dynmeshd: " << status.message() << "\n";
   return status.ok() ? EXIT_SUCCESS : EXIT_FAILURE;

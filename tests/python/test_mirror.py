@@ -198,6 +198,22 @@ def test_a_namesake_that_has_come_as_far_is_not_taken_for_the_old_session(client
     session.delete()
 
 
+def test_one_that_reads_slowly_is_sent_fewer_larger_deltas(daemon, session):
+    session.import_mesh(grid_tets(12), progress=False)
+    read_on = threading.Event()
+    with daemon.connect(read_ahead_bytes=64 << 10) as client:
+        with client.session(session.name).mirror(codec="raw", on_delta=lambda _: read_on.wait(WAIT_S)) as mirror:
+            mirror.wait(1, timeout=WAIT_S)
+            for _ in range(40):
+                revision = move(session, np.arange(13**3))  # 60 KB each
+            read_on.set()
+            mirror.wait(revision, timeout=WAIT_S)
+            assert_equal(mirror, session)
+            assert mirror.stats.deltas < 10
+    with pytest.raises(dynmesh.InvalidArgumentError):
+        daemon.connect(read_ahead_bytes=1000)
+
+
 def test_deleting_the_session_ends_it(client):
     session = client.create_session("short")
     with session.mirror() as mirror:

@@ -228,6 +228,26 @@ TEST_F(DynmeshdTest, TheEnvironmentStandsInForFlags) {
   EXPECT_EQ(other.Wait(), 0);
 }
 
+TEST_F(DynmeshdTest, TheHealthCheckFollowsTheFlagsAndTheEnvironment) {
+  EXPECT_EQ(ProbeTarget({"0.0.0.0:7447"}, ""), "127.0.0.1:7447");
+  EXPECT_EQ(ProbeTarget({"", "[::]:1", "127.0.0.1:2"}, "/s"), "[::1]:1");
+  EXPECT_EQ(ProbeTarget({"10.1.2.3:4"}, "/s"), "10.1.2.3:4");
+  EXPECT_EQ(ProbeTarget({"127.0.0.1:0"}, "/s"), "unix:/s");
+  EXPECT_EQ(ProbeTarget({}, ""), "");
+  const std::string socket = ::testing::TempDir() + "dynmeshd-" + std::to_string(getpid()) + ".sock";
+  const std::vector<std::string> environment = {"DYNMESHD_LISTEN=127.0.0.1:0", "DYNMESHD_UNIX_SOCKET=" + socket};
+  const std::vector<std::string> check = {"--health_check=self"};
+  Process process({"--ready_file=" + ready_file_}, environment);
+  const auto addresses = AwaitReady();
+  ASSERT_EQ(addresses.size(), 2u);
+  Run(0, check, environment);
+  Run(0, check, {"DYNMESHD_LISTEN=" + addresses[0]});
+  process.Signal(SIGTERM);
+  EXPECT_EQ(process.Wait(), 0);
+  Run(1, check, environment);
+  Run(1, check, {"DYNMESHD_LISTEN="});
+}
+
 TEST_F(DynmeshdTest, WrongCallsSayWhatIsWrong) {
   const auto expect = [&](const std::string& said, const std::vector<std::string>& arguments,
                           const std::vector<std::string>& environment = {}) {

@@ -18,6 +18,7 @@ DEFAULT_TARGET = "127.0.0.1:7447"
 DEFAULT_TIMEOUT_S = 60.0
 
 _PAGE_SIZE = 1000
+_LEAST_WINDOW = 64 << 10
 _POLICIES = {"keep": sessions_pb2.DUPLICATE_POLICY_KEEP, "refuse": sessions_pb2.DUPLICATE_POLICY_REFUSE}
 _CHANNEL_OPTIONS = (
     ("grpc.max_receive_message_length", -1),  # deltas are as large as the server's own limit allows
@@ -37,9 +38,12 @@ class Client:
     Thread safety: everything may be called from any thread.
     """
 
-    def __init__(self, target: str, timeout: float, retries: int, max_message_bytes: int) -> None:
+    def __init__(
+        self, target: str, timeout: float, retries: int, max_message_bytes: int, read_ahead_bytes: int | None
+    ) -> None:
         self.target = target
-        self._channel = grpc.insecure_channel(target, options=_CHANNEL_OPTIONS)
+        options = (*_CHANNEL_OPTIONS, *_window_options(read_ahead_bytes))
+        self._channel = grpc.insecure_channel(target, options=options)
         self._caller = Caller(timeout, retries, max_message_bytes)
         self._sessions = sessions_pb2_grpc.SessionServiceStub(self._channel)
 
@@ -117,6 +121,7 @@ def connect(
     timeout: float = DEFAULT_TIMEOUT_S,
     retries: int = 2,
     max_message_bytes: int = DEFAULT_MAX_MESSAGE_BYTES,
+    read_ahead_bytes: int | None = None,
 ) -> Client:
     """Attaches to a daemon. Returns at once: the first call finds out whether one is there.
 
@@ -131,5 +136,19 @@ def connect(
     max_message_bytes : int
         The server's flag of that name, where it is not the default. A request of more than four times that is
         not sent, because gRPC would refuse it at the other end without saying why.
+    read_ahead_bytes : int, optional
+        How much of each answer the server may send ahead of what has been read, 64 KiB at least. By default as
+        much as keeps the line busy, up to some megabytes; what a slow mirror has not read yet is that much out
+        of date. Over a line that is both fast and far, a small number makes answers slow.
     """
-    return Client(target, timeout, retries, max_message_bytes)
+    return Client(target, timeout, retries, max_message_bytes, read_ahead_bytes)
+
+
+def _window_options(read_ahead_bytes: int | None) -> tuple[tuple[str, int], ...]:
+    if read_ahead_bytes is None:
+        return ()
+    if not _LEAST_WINDOW <= read_ahead_bytes < 2**31:
+        raise InvalidArgumentError(
+            f"read_ahead_bytes is at least {_LEAST_WINDOW}, not {read_ahead_bytes}", reason="BAD_ARGUMENT"
+        )
+    return ("grpc.http2.bdp_probe", 0), ("grpc.http2.lookahead_bytes", read_ahead_bytes)

@@ -69,9 +69,16 @@ class Daemon:
         timeout: float = DEFAULT_TIMEOUT_S,
         retries: int = 2,
         max_message_bytes: int = DEFAULT_MAX_MESSAGE_BYTES,
+        read_ahead_bytes: int | None = None,
     ) -> Client:
         """Another client of this daemon: as `dynmesh.connect`."""
-        return connect(self.target, timeout=timeout, retries=retries, max_message_bytes=max_message_bytes)
+        return connect(
+            self.target,
+            timeout=timeout,
+            retries=retries,
+            max_message_bytes=max_message_bytes,
+            read_ahead_bytes=read_ahead_bytes,
+        )
 
     def log_tail(self, lines: int = _LOG_TAIL_LINES) -> str:
         """The last lines of the daemon's log."""
