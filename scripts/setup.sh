@@ -11,7 +11,7 @@ server_packages=(
 )
 build_packages=(
   "${server_packages[@]}"
-  python3 python3-dev python3-venv python3-setuptools python3-pybind11 pybind11-dev
+  python3 python3-dev python3-venv python3-setuptools python3-wheel python3-pybind11 pybind11-dev
   python3-grpcio python3-protobuf python3-numpy python3-meshio python3-tqdm
 )
 test_packages=(

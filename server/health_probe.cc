@@ -30,6 +30,20 @@ std::string ToString(const grpc::ByteBuffer& buffer) {
 
 }  // namespace
 
+std::string ProbeTarget(const std::vector<std::string>& listen, const std::string& unix_socket) {
+  for (const std::string& address : listen) {
+    const size_t colon = address.rfind(':');
+    if (colon == std::string::npos) continue;
+    const std::string host = address.substr(0, colon);
+    const std::string port = address.substr(colon);
+    if (port == ":0" || port == ":") continue;
+    if (host == "0.0.0.0") return absl::StrCat("127.0.0.1", port);
+    if (host == "[::]") return absl::StrCat("[::1]", port);
+    return address;
+  }
+  return unix_socket.empty() ? "" : absl::StrCat("unix:", unix_socket);
+}
+
 absl::Status ProbeHealth(const std::string& target, absl::Duration timeout) {
   grpc::GenericStub stub(grpc::CreateChannel(target, grpc::InsecureChannelCredentials()));
   grpc::ClientContext context;

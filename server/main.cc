@@ -10,6 +10,7 @@
 #include <fstream>
 #include <iostream>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "absl/flags/flag.h"
@@ -20,6 +21,7 @@
 #include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
+#include "absl/time/clock.h"
 #include "absl/time/time.h"
 #include "server/health_probe.h"
 #include "server/server.h"
@@ -35,27 +37,40 @@ ABSL_FLAG(std::string, ready_file, "",
           "File that is written, one address a line, when the server is serving; removed at the end");
 ABSL_FLAG(std::string, log_level, "info", "trace, debug, info, warn, error or off");
 ABSL_FLAG(absl::Duration, drain_timeout, absl::Seconds(10),
-          "How long calls under way may go on after SIGTERM or SIGINT");
+          "How long calls under way may go on after SIGTERM or SIGINT; the daemon ends at most 5 s later");
 ABSL_FLAG(bool, exit_with_parent, false, "Drain and exit when the process that started this one ends");
 ABSL_FLAG(std::string, health_check, "",
-          "Do not serve: ask the server at this gRPC target for its health, and exit with 0 or 1");
-ABSL_FLAG(int32_t, quick_threads, 0, "Threads for edits and queries; 0: one for each processor, at least 2");
-ABSL_FLAG(int32_t, heavy_threads, 2, "Threads for imports, exports and validation");
+          "Do not serve: ask the server at this gRPC target for its health, and exit with 0 or 1. \"self\": where "
+          "one with the other flags and the same environment serves");
+ABSL_FLAG(int32_t, quick_threads, 0, "Threads for edits and small queries; 0: four for each processor, at least 8");
+ABSL_FLAG(int32_t, heavy_threads, 0,
+          "Threads for imports, exports, validation and large queries; 0: four more than max_concurrent_imports");
 
 ABSL_FLAG(uint32_t, max_sessions, dynmesh::Limits().max_sessions, "Sessions");
 ABSL_FLAG(uint32_t, max_vertices, dynmesh::Limits().max_vertices, "Vertices of a session");
 ABSL_FLAG(uint32_t, max_edges, dynmesh::Limits().max_edges, "Edges of a session, derived ones included");
 ABSL_FLAG(uint32_t, max_faces, dynmesh::Limits().max_faces, "Faces of a session, derived ones included");
 ABSL_FLAG(uint32_t, max_cells, dynmesh::Limits().max_cells, "Cells of a session");
-ABSL_FLAG(uint64_t, max_session_bytes, dynmesh::Limits().max_session_bytes, "Memory of a session's mesh");
+ABSL_FLAG(uint64_t, max_session_bytes, dynmesh::Limits().max_session_bytes,
+          "Memory of a session's mesh; by default the smaller of 64 GiB and 3/4 of the machine's memory");
 ABSL_FLAG(uint64_t, max_batch_edits, dynmesh::Limits().max_batch_edits, "Edits in a batch");
 ABSL_FLAG(uint64_t, max_batch_items, dynmesh::Limits().max_batch_items,
           "Vertices, elements and rows that the edits of a batch name");
 ABSL_FLAG(uint64_t, max_message_bytes, dynmesh::Limits().max_message_bytes, "One request message");
 ABSL_FLAG(uint64_t, max_query_bytes, dynmesh::Limits().max_query_bytes, "One answer of a query or export");
+ABSL_FLAG(uint64_t, max_query_steps, dynmesh::Limits().max_query_steps,
+          "Entities and incidences that one query or export may look at, about ten nanoseconds each");
+ABSL_FLAG(uint64_t, max_answer_bytes, dynmesh::Limits().max_answer_bytes,
+          "All answers of queries and exports that wait to be read");
 ABSL_FLAG(uint32_t, max_followers, dynmesh::Limits().max_followers, "Subscriptions of a session");
 ABSL_FLAG(uint32_t, max_concurrent_imports, dynmesh::Limits().max_concurrent_imports, "Imports at once");
-ABSL_FLAG(uint32_t, max_queued_tasks, dynmesh::Limits().max_queued_tasks, "Calls that wait for a thread");
+ABSL_FLAG(uint64_t, max_staged_bytes, dynmesh::Limits().max_staged_bytes,
+          "What imports have received and not built yet, all together");
+ABSL_FLAG(absl::Duration, import_idle_timeout, dynmesh::Limits().import_idle_timeout,
+          "How long an import may send nothing");
+ABSL_FLAG(uint32_t, max_queued_tasks, dynmesh::Limits().max_queued_tasks,
+          "Calls that wait for a thread or for their session, for each of the two pools of threads");
+ABSL_FLAG(uint64_t, max_queued_bytes, dynmesh::Limits().max_queued_bytes, "Requests of the calls that wait");
 
 namespace dynmesh {
 namespace {
@@ -66,6 +81,8 @@ constexpr char kUsage[] =
     "e.g. DYNMESHD_LISTEN=127.0.0.1:0.";
 constexpr char kEnvironmentPrefix[] = "DYNMESHD_";
 constexpr absl::Duration kHealthTimeout = absl::Seconds(5);
+// After drain_timeout calls are cancelled; what computes notices within a second, unless it is our fault.
+constexpr absl::Duration kDrainGrace = absl::Seconds(5);
 
 bool IsOwnFlag(const absl::CommandLineFlag& flag) {
   return absl::string_view(flag.Filename()).find("server/main.cc") != absl::string_view::npos;
@@ -108,9 +125,14 @@ Limits LimitsFromFlags() {
   limits.max_batch_items = absl::GetFlag(FLAGS_max_batch_items);
   limits.max_message_bytes = absl::GetFlag(FLAGS_max_message_bytes);
   limits.max_query_bytes = absl::GetFlag(FLAGS_max_query_bytes);
+  limits.max_query_steps = absl::GetFlag(FLAGS_max_query_steps);
+  limits.max_answer_bytes = absl::GetFlag(FLAGS_max_answer_bytes);
   limits.max_followers = absl::GetFlag(FLAGS_max_followers);
   limits.max_concurrent_imports = absl::GetFlag(FLAGS_max_concurrent_imports);
+  limits.max_staged_bytes = absl::GetFlag(FLAGS_max_staged_bytes);
+  limits.import_idle_timeout = absl::GetFlag(FLAGS_import_idle_timeout);
   limits.max_queued_tasks = absl::GetFlag(FLAGS_max_queued_tasks);
+  limits.max_queued_bytes = absl::GetFlag(FLAGS_max_queued_bytes);
   return limits;
 }
 
@@ -124,7 +146,7 @@ ServerOptions OptionsFromFlags() {
   options.allow_insecure = absl::GetFlag(FLAGS_allow_insecure);
   options.limits = LimitsFromFlags();
   options.quick_threads = absl::GetFlag(FLAGS_quick_threads);
-  options.heavy_threads = std::max(1, absl::GetFlag(FLAGS_heavy_threads));
+  options.heavy_threads = absl::GetFlag(FLAGS_heavy_threads);
   return options;
 }
 
@@ -155,10 +177,24 @@ bool TieToParent() {
   return prctl(PR_SET_PDEATHSIG, SIGTERM) == 0 && getppid() == parent;
 }
 
-int CheckHealth(const std::string& target) {
+int CheckHealth(std::string target) {
+  if (target == "self") target = ProbeTarget(absl::GetFlag(FLAGS_listen), absl::GetFlag(FLAGS_unix_socket));
+  if (target.empty()) {
+    std::cerr << "dynmeshd: --health_check=self needs an address with a port, or a unix socket\n";
+    return EXIT_FAILURE;
+  }
   const absl::Status status = ProbeHealth(target, kHealthTimeout);
   if (!status.ok()) std::cerr << "dynmeshd: " << status.message() << "\n";
   return status.ok() ? EXIT_SUCCESS : EXIT_FAILURE;
+}
+
+/// Ends the process when the drain does not: whoever waits for us must not have to kill us.
+void ExitAt(absl::Time deadline) {
+  std::thread([deadline] {
+    absl::SleepFor(deadline - absl::Now());
+    spdlog::critical("drain_overrun");
+    _exit(EXIT_FAILURE);
+  }).detach();
 }
 
 int Serve() {
@@ -179,7 +215,10 @@ int Serve() {
   sigwait(&signals, &signal_number);
   spdlog::info("signal number={}", signal_number);
   if (!ready_file.empty()) std::remove(ready_file.c_str());
-  (*server)->Drain(absl::GetFlag(FLAGS_drain_timeout));
+  const absl::Duration timeout = absl::GetFlag(FLAGS_drain_timeout);
+  ExitAt(absl::Now() + timeout + kDrainGrace);
+  (*server)->Drain(timeout);
+  *server = nullptr;
   return EXIT_SUCCESS;
 }
 

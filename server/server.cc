@@ -94,12 +94,19 @@ absl::Status CannotListen(absl::string_view address) {
 }
 
 Executor::Options ExecutorOptions(const char* name, int threads, const Limits& limits) {
-  return {name, threads, limits.max_queued_tasks};
+  return {name, threads, limits.max_queued_tasks, limits.max_queued_bytes};
 }
 
+/// More than processors: one that waits for memory or for a lock for a moment costs nothing.
 int QuickThreads(const ServerOptions& options) {
   if (options.quick_threads > 0) return options.quick_threads;
-  return std::max<int>(2, std::thread::hardware_concurrency());
+  return std::max<int>(8, 4 * std::thread::hardware_concurrency());
+}
+
+/// More than imports may take.
+int HeavyThreads(const ServerOptions& options) {
+  if (options.heavy_threads > 0) return options.heavy_threads;
+  return static_cast<int>(std::min(options.limits.max_concurrent_imports, 16u)) + 4;
 }
 
 }  // namespace
@@ -117,7 +124,7 @@ class Server::Impl {
  public:
   explicit Impl(const ServerOptions& options)
       : quick_(ExecutorOptions("quick", QuickThreads(options), options.limits)),
-        heavy_(ExecutorOptions("heavy", options.heavy_threads, options.limits)),
+        heavy_(ExecutorOptions("heavy", HeavyThreads(options), options.limits)),
         registry_(options.limits, Workers{&quick_, &heavy_, &timer_}) {
     const ServiceContext context{registry_, streams_};
     services_.push_back(MakeSessionsService(context));

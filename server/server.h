@@ -21,8 +21,8 @@ struct ServerOptions {
   /// Needed for any address that others than this machine can reach: nothing is encrypted or authenticated.
   bool allow_insecure = false;
   Limits limits;
-  int quick_threads = 0;  ///< 0: one for each processor, at least 2
-  int heavy_threads = 2;
+  int quick_threads = 0;  ///< 0: four for each processor, at least 8
+  int heavy_threads = 0;  ///< 0: four more than max_concurrent_imports
 };
 
 /// INVALID_ARGUMENT unless `address` is "host:port" of the loopback interface.

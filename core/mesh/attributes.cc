@@ -80,6 +80,20 @@ size_t AttributeColumn::memory_bytes() const {
   return bytes;
 }
 
+size_t AttributeColumn::BytesToSet(absl::Span<const Slot> slots) const {
+  std::vector<Slot> missing;
+  Slot end = 0;
+  for (Slot slot : slots) {
+    const Slot page = slot / StampColumn::kPageSlots;
+    if (page >= pages_.size() || pages_[page].empty()) missing.push_back(page);
+    end = std::max(end, slot + 1);
+  }
+  std::sort(missing.begin(), missing.end());
+  const size_t num_missing = std::unique(missing.begin(), missing.end()) - missing.begin();
+  const size_t new_stamps = end > stamps_.size() ? end - stamps_.size() : 0;
+  return num_missing * StampColumn::kPageSlots * zeros_.size() + new_stamps * sizeof(Stamp);
+}
+
 void AttributeColumn::CopyRow(Slot slot, absl::Span<const uint8_t> row) {
   assert(row.size() == zeros_.size());
   const size_t page = slot / StampColumn::kPageSlots;

@@ -65,6 +65,9 @@ class AttributeColumn {
   /// Puts back a row and its stamp, as if SetRow had never been called.
   void RestoreRow(Slot slot, absl::Span<const uint8_t> row, Stamp stamp);
 
+  /// Bytes that setting these rows would add to memory_bytes(): whole pages. Cost: sorts the pages.
+  size_t BytesToSet(absl::Span<const Slot> slots) const;
+
   const StampColumn& stamps() const { return stamps_; }
   size_t memory_bytes() const;
 

@@ -1,9 +1,12 @@
 #include "core/mesh/validate.h"
 
 #include <algorithm>
-#include <map>
+#include <numeric>
+#include <utility>
 
+#include "absl/container/inlined_vector.h"
 #include "absl/strings/str_cat.h"
+#include "core/mesh/relations.h"
 #include "core/mesh/row_block.h"
 
 namespace dynmesh {
@@ -11,31 +14,32 @@ namespace dynmesh {
 /// Collects violations; one method for each group of invariants.
 class MeshValidator {
  public:
-  MeshValidator(const Mesh& mesh, size_t max_violations) : mesh_(mesh), max_violations_(max_violations) {}
+  MeshValidator(const Mesh& mesh, const ValidateOptions& options) : mesh_(mesh), options_(options) {}
 
   std::vector<std::string> Run() {
-    CheckEdges();
-    CheckFaces();
-    CheckCells();
+    using Check = void (MeshValidator::*)();
+    constexpr Check kDownward[] = {&MeshValidator::CheckEdges, &MeshValidator::CheckFaces,
+                                   &MeshValidator::CheckCells};
+    constexpr Check kRest[] = {
+        &MeshValidator::CheckVertexEdges, &MeshValidator::CheckEdgeFaces,    &MeshValidator::CheckFaceCells,
+        &MeshValidator::CheckHubEdges,    &MeshValidator::CheckHubFaces,     &MeshValidator::CheckPrimaryEdges,
+        &MeshValidator::CheckPrimaryFaces, &MeshValidator::CheckBoundary,    &MeshValidator::CheckCountsAndStamps,
+        &MeshValidator::CheckDegenerate,  &MeshValidator::CheckStoredRelations, &MeshValidator::CheckAttributes,
+        &MeshValidator::CheckChecksum};
+    for (Check check : kDownward) {
+      if (options_.goes_on()) (this->*check)();
+    }
     if (!violations_.empty()) return std::move(violations_);  // the rest follows references
-    CheckUpwardLists();
-    CheckHubEdges();
-    CheckHubFaces();
-    CheckPrimaries(EntityKind::kEdge);
-    CheckPrimaries(EntityKind::kFace);
-    CheckBoundary();
-    CheckCountsAndStamps();
-    CheckDegenerate();
-    CheckStoredRelations();
-    CheckAttributes();
-    CheckChecksum();
+    for (Check check : kRest) {
+      if (options_.goes_on()) (this->*check)();
+    }
     return std::move(violations_);
   }
 
  private:
   template <typename... Args>
   void Report(const Args&... args) {
-    if (violations_.size() < max_violations_) violations_.push_back(absl::StrCat(args...));
+    if (violations_.size() < options_.max_violations) violations_.push_back(absl::StrCat(args...));
   }
 
   template <typename UpperId, typename Fn>
@@ -131,32 +135,70 @@ class MeshValidator {
 
   // ---- Upward lists: exactly the inverse of the downward references ----
 
-  void CheckUpwardLists() {
-    using Uses = std::map<std::pair<Slot, Slot>, int>;
-    Uses edges, faces, cells;
-    ForEachLive<EdgeId>(EntityKind::kEdge, [&](EdgeId e) {
-      for (VertexId v : mesh_.Vertices(e)) ++edges[{v.slot(), e.slot()}];
-    });
-    ForEachLive<FaceId>(EntityKind::kFace, [&](FaceId f) {
-      for (EdgeId e : mesh_.Edges(f)) ++faces[{e.slot(), f.slot()}];
-    });
-    ForEachLive<CellId>(EntityKind::kCell, [&](CellId c) {
-      for (OrientedFace oriented : mesh_.Faces(c)) ++cells[{oriented.face().slot(), c.slot()}];
-    });
-    Compare<VertexId>(EntityKind::kVertex, edges, [&](VertexId v) { return mesh_.IncidentEdges(v); });
-    Compare<EdgeId>(EntityKind::kEdge, faces, [&](EdgeId e) { return mesh_.IncidentFaces(e); });
-    Compare<FaceId>(EntityKind::kFace, cells, [&](FaceId f) { return mesh_.IncidentCells(f); });
+  void CheckVertexEdges() {
+    CheckUpwardLists<VertexId, EdgeId>(
+        EntityKind::kVertex, EntityKind::kEdge, [this](EdgeId e) { return mesh_.Vertices(e); },
+        [this](VertexId v) { return mesh_.IncidentEdges(v); });
   }
 
-  template <typename LowerId, typename Uses, typename ListOf>
-  void Compare(EntityKind kind, Uses& uses, ListOf list_of) {
-    ForEachLive<LowerId>(kind, [&](LowerId lower) {
-      for (auto upper : list_of(lower)) --uses[{lower.slot(), upper.slot()}];
+  void CheckEdgeFaces() {
+    CheckUpwardLists<EdgeId, FaceId>(
+        EntityKind::kEdge, EntityKind::kFace, [this](FaceId f) { return mesh_.Edges(f); },
+        [this](EdgeId e) { return mesh_.IncidentFaces(e); });
+  }
+
+  void CheckFaceCells() {
+    const auto faces_of = [this](CellId c) {
+      absl::InlinedVector<FaceId, kMaxElementFaces> faces;
+      for (OrientedFace oriented : mesh_.Faces(c)) faces.push_back(oriented.face());
+      return faces;
+    };
+    CheckUpwardLists<FaceId, CellId>(EntityKind::kFace, EntityKind::kCell, faces_of,
+                                     [this](FaceId f) { return mesh_.IncidentCells(f); });
+  }
+
+  /// Users of each lower entity, ascending, as compressed sparse rows: a counting sort of the downward references.
+  template <typename UpperId, typename PartsOf>
+  CsrTable CountUses(EntityKind lower, EntityKind upper, PartsOf parts_of) const {
+    CsrTable uses;
+    uses.offsets.assign(size_t{mesh_.slots(lower).limit()} + 2, 0);
+    ForEachLive<UpperId>(upper, [&](UpperId user) {
+      for (auto part : parts_of(user)) ++uses.offsets[part.slot() + 2];
     });
-    for (const auto& [pair, difference] : uses) {
-      if (difference == 0) continue;
-      Report(EntityKindName(kind), " ", pair.first, " lists its user ", pair.second, " ",
-             difference > 0 ? "too rarely" : "too often");
+    std::partial_sum(uses.offsets.begin(), uses.offsets.end(), uses.offsets.begin());
+    uses.ids.resize(uses.offsets.back());
+    ForEachLive<UpperId>(upper, [&](UpperId user) {
+      for (auto part : parts_of(user)) uses.ids[uses.offsets[part.slot() + 1]++] = user.slot();
+    });
+    return uses;
+  }
+
+  template <typename LowerId, typename UpperId, typename PartsOf, typename ListOf>
+  void CheckUpwardLists(EntityKind lower, EntityKind upper, PartsOf parts_of, ListOf list_of) {
+    const CsrTable uses = CountUses<UpperId>(lower, upper, parts_of);
+    std::vector<Slot> listed;
+    ForEachLive<LowerId>(lower, [&](LowerId id) {
+      listed.clear();
+      for (auto user : list_of(id)) listed.push_back(user.slot());
+      std::sort(listed.begin(), listed.end());
+      const auto expected = uses.Row(id.slot());
+      if (!std::equal(listed.begin(), listed.end(), expected.begin(), expected.end())) {
+        ReportDifferences({lower, id.slot()}, expected, listed);
+      }
+    });
+  }
+
+  /// Both ascend.
+  void ReportDifferences(EntityId lower, absl::Span<const Slot> expected, absl::Span<const Slot> listed) {
+    for (size_t e = 0, l = 0; e < expected.size() || l < listed.size();) {
+      const Slot user = std::min(e < expected.size() ? expected[e] : kNoSlot, l < listed.size() ? listed[l] : kNoSlot);
+      size_t times_expected = 0;
+      size_t times_listed = 0;
+      for (; e < expected.size() && expected[e] == user; ++e) ++times_expected;
+      for (; l < listed.size() && listed[l] == user; ++l) ++times_listed;
+      if (times_expected == times_listed) continue;
+      Report(EntityKindName(lower.kind), " ", lower.slot, " lists its user ", user, " ",
+             times_expected > times_listed ? "too rarely" : "too often");
     }
   }
 
@@ -198,27 +240,64 @@ class MeshValidator {
 
   // ---- Duplicates ----
 
-  void CheckPrimaries(EntityKind kind) {
-    std::map<CycleKey, int> primaries;
-    std::map<CycleKey, std::vector<Slot>> duplicates;
+  void CheckPrimaryEdges() { CheckPrimaries(EntityKind::kEdge); }
+  void CheckPrimaryFaces() { CheckPrimaries(EntityKind::kFace); }
+
+  using KeyedSlot = std::pair<CycleKey, Slot>;
+
+  /// Edges or faces with their cycles, sorted by both: by the smallest vertex through buckets, which are small.
+  std::vector<KeyedSlot> SortByCycle(EntityKind kind) const {
+    std::vector<uint32_t> begins(size_t{mesh_.slots(EntityKind::kVertex).limit()} + 2, 0);
+    std::vector<KeyedSlot> unsorted;
+    unsorted.reserve(mesh_.NumLive(kind));
     mesh_.slots(kind).live().ForEach([&](Slot slot) {
+      unsorted.push_back({CanonicalCycle(mesh_.VerticesOf({kind, slot})), slot});
+      ++begins[unsorted.back().first[0].slot() + 2];
+    });
+    std::partial_sum(begins.begin(), begins.end(), begins.begin());
+    std::vector<KeyedSlot> sorted(unsorted.size());
+    for (const KeyedSlot& keyed : unsorted) sorted[begins[keyed.first[0].slot() + 1]++] = keyed;
+    for (size_t v = 0; v + 1 < begins.size(); ++v) {
+      if (begins[v + 1] - begins[v] > 1) std::sort(sorted.begin() + begins[v], sorted.begin() + begins[v + 1]);
+    }
+    return sorted;
+  }
+
+  void CheckPrimaries(EntityKind kind) {
+    const std::vector<KeyedSlot> sorted = SortByCycle(kind);
+    size_t cycles_with_duplicates = 0;
+    for (size_t begin = 0; begin < sorted.size();) {
+      size_t end = begin + 1;
+      while (end < sorted.size() && sorted[end].first == sorted[begin].first) ++end;
+      cycles_with_duplicates += CheckOneCycle(kind, absl::MakeConstSpan(sorted).subspan(begin, end - begin));
+      begin = end;
+    }
+    if (mesh_.duplicates_[Dimension(kind)].size() != cycles_with_duplicates) {
+      Report("wrong number of ", EntityKindName(kind), " duplicates indexed");
+    }
+  }
+
+  /// Whether there are duplicates among those that share a cycle.
+  bool CheckOneCycle(EntityKind kind, absl::Span<const KeyedSlot> sharing) {
+    int primaries = 0;
+    std::vector<Slot> duplicates;
+    for (const auto& [key, slot] : sharing) {
       const EntityId id(kind, slot);
-      const CycleKey key = CanonicalCycle(mesh_.VerticesOf(id));
       if (mesh_.IsDuplicate(id)) {
-        duplicates[key].push_back(slot);
+        duplicates.push_back(slot);
         if (!mesh_.IsElement(id)) Report("derived duplicate ", EntityKindName(kind), " ", slot);
-      } else if (++primaries[key] > 1) {
+      } else if (++primaries > 1) {
         Report("two primaries, one is ", EntityKindName(kind), " ", slot);
       }
-    });
-    const auto& index = mesh_.duplicates_[Dimension(kind)];
-    if (index.size() != duplicates.size()) Report("wrong number of ", EntityKindName(kind), " duplicates indexed");
-    for (const auto& [key, slots] : duplicates) {
-      if (primaries.count(key) == 0) Report("duplicate ", EntityKindName(kind), " ", slots[0], " without primary");
-      const auto it = index.find(key);
-      const bool indexed = it != index.end() && std::equal(slots.begin(), slots.end(), it->second.begin(), it->second.end());
-      if (!indexed) Report("duplicate ", EntityKindName(kind), " ", slots[0], " is not indexed");
     }
+    if (duplicates.empty()) return false;
+    if (primaries == 0) Report("duplicate ", EntityKindName(kind), " ", duplicates[0], " without primary");
+    const auto& index = mesh_.duplicates_[Dimension(kind)];
+    const auto it = index.find(sharing[0].first);
+    const bool indexed = it != index.end() && std::equal(duplicates.begin(), duplicates.end(), it->second.begin(),
+                                                         it->second.end());
+    if (!indexed) Report("duplicate ", EntityKindName(kind), " ", duplicates[0], " is not indexed");
+    return true;
   }
 
   // ---- Boundary ----
@@ -349,13 +428,13 @@ class MeshValidator {
   }
 
   const Mesh& mesh_;
-  const size_t max_violations_;
+  const ValidateOptions options_;
   std::vector<std::string> violations_;
   RowBlock block_;
 };
 
-std::vector<std::string> Validate(const Mesh& mesh, size_t max_violations) {
-  return MeshValidator(mesh, max_violations).Run();
+std::vector<std::string> Validate(const Mesh& mesh, const ValidateOptions& options) {
+  return MeshValidator(mesh, options).Run();
 }
 
 }  // namespace dynmesh

@@ -9,15 +9,18 @@
 
 namespace dynmesh {
 
-absl::Status ApplyEdits(const ServiceContext& services, const v1::ApplyEditsRequest& request,
+absl::Status ApplyEdits(Session& session, const v1::ApplyEditsRequest& request,
                         v1::ApplyEditsResponse* response) {
-  DYNMESH_RETURN_IF_ERROR(CheckMessageSize(request, services.limits()));
-  DYNMESH_ASSIGN_OR_RETURN(const SessionPtr session, services.registry.Find(request.session()));
-  DYNMESH_ASSIGN_OR_RETURN(const std::vector<Edit> edits, ToEdits(request, services.limits()));
+  DYNMESH_RETURN_IF_ERROR(CheckMessageSize(request, session.limits()));
+  DYNMESH_ASSIGN_OR_RETURN(const std::vector<Edit> edits, ToEdits(request, session.limits()));
   DYNMESH_ASSIGN_OR_RETURN(const std::shared_ptr<const BatchResult> result,
-                           session->Apply(edits, ToApplyOptions(request)));
+                           session.Apply(edits, ToApplyOptions(request)));
   FromBatchResult(*result, response);
   return absl::OkStatus();
+}
+
+size_t MemoryOf(const v1::ApplyEditsRequest& request) {
+  return request.ByteSizeLong() + request.edits_size() * (sizeof(v1::Edit) + sizeof(v1::AttributeValues));
 }
 
 }  // namespace dynmesh

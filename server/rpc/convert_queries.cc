@@ -1,5 +1,7 @@
 #include "server/rpc/convert_queries.h"
 
+#include <algorithm>
+
 #include "server/rpc/convert.h"
 #include "server/session/session_errors.h"
 
@@ -18,6 +20,13 @@ absl::StatusOr<Selection> ToSelection(const v1::Selection& message, int64_t as_o
   }
   if (message.has_all() && message.all()) return selection;
   return BadField("selection", "selection names neither ids nor a range nor all");
+}
+
+uint64_t CountSelected(const v1::Selection& message, uint64_t num_live) {
+  if (message.has_ids()) return message.ids().size() / sizeof(Slot);
+  if (!message.has_range()) return num_live;
+  const auto& range = message.range();
+  return std::min<uint64_t>(num_live, range.end() - std::min(range.begin(), range.end()));
 }
 
 absl::StatusOr<Relation> ToRelation(const v1::GetNeighborsRequest& request) {

@@ -75,6 +75,7 @@ absl::StatusOr<SessionSettings> ToSettings(const v1::SessionSettings& message) {
 v1::Session FromSessionInfo(const SessionInfo& info) {
   v1::Session message;
   message.set_name(info.name);
+  message.set_uid(info.uid);
   message.set_revision(info.revision);
   message.set_etag(info.etag);
   message.mutable_settings()->set_duplicate_policy(info.settings.duplicates == DuplicatePolicy::kRefuse

@@ -23,6 +23,7 @@ void AppendLengthPrefix(int field_number, uint32_t length, std::string* out) {
 absl::StatusOr<FollowOptions> ToFollowOptions(const v1::SubscribeRequest& request) {
   FollowOptions options;
   options.from_revision = request.from_revision();
+  options.session_uid = request.session_uid();
   if (request.codec() < v1::DELTA_CODEC_UNSPECIFIED || request.codec() > v1::DELTA_CODEC_DRACO) {
     return BadField("codec", "there is no such codec");
   }
@@ -35,6 +36,7 @@ absl::StatusOr<FollowOptions> ToFollowOptions(const v1::SubscribeRequest& reques
 std::string FromPayloadHead(const Payload& payload) {
   v1::SubscribeResponse response;
   response.set_revision(payload.revision);
+  response.set_session_uid(payload.session_uid);
   response.set_from_revision(payload.from_revision);
   response.set_consistent(payload.consistent);
   response.set_commit_time_us(payload.commit_time_us);

@@ -16,8 +16,11 @@ class EditsService final : public v1::EditService::CallbackService {
   grpc::ServerUnaryReactor* ApplyEdits(grpc::CallbackServerContext* context,
                                        const v1::ApplyEditsRequest* request,
                                        v1::ApplyEditsResponse* response) override {
-    return RunUnary("ApplyEdits", context, services_.quick(),
-                    [this, request, response] { return dynmesh::ApplyEdits(services_, *request, response); });
+    return RunOnSession({"ApplyEdits", context, services_}, request->session(),
+                        {AccessMode::kWrite, /*heavy=*/false, MemoryOf(*request)},
+                        [request, response](const SessionPtr& session, AccessGrant) {
+                          return dynmesh::ApplyEdits(*session, *request, response);
+                        });
   }
 
   grpc::ServerBidiReactor<v1::StreamEditsRequest, v1::StreamEditsResponse>* StreamEdits(

@@ -1,12 +1,15 @@
 #include "server/rpc/import_reactor.h"
 
+#include <algorithm>
 #include <utility>
 
+#include "absl/time/clock.h"
 #include "core/mesh/error.h"
 #include "server/rpc/convert_sessions.h"
 #include "server/rpc/status.h"
 #include "server/rpc/unary.h"
 #include "server/session/catch_exceptions.h"
+#include "server/session/session_errors.h"
 
 namespace dynmesh {
 namespace {
@@ -19,11 +22,68 @@ constexpr uint64_t kItemsPerReport = 100'000;
 }  // namespace
 
 ImportReactor* ImportReactor::Start() {
-  StartRead(&request_);
+  {
+    MutexLock lock(&watch_->mu);
+    watch_->reactor = this;
+  }
+  WatchUntil(absl::Now() + services_.limits().import_idle_timeout);
+  ReadNext();
   return this;
 }
 
+void ImportReactor::OnDone() {
+  {
+    MutexLock lock(&watch_->mu);
+    watch_->reactor = nullptr;
+  }
+  delete this;
+}
+
+void ImportReactor::ReadNext() {
+  {
+    MutexLock lock(&mu_);
+    waiting_since_ = absl::Now();
+  }
+  StartRead(&request_);
+}
+
+void ImportReactor::WatchUntil(absl::Time when) {
+  services_.registry.workers().timer->RunAt(when, [watch = watch_] {
+    MutexLock lock(&watch->mu);
+    if (watch->reactor != nullptr) watch->reactor->OnWatch();
+  });
+}
+
+// Holds watch_->mu, so OnDone() waits.
+void ImportReactor::OnWatch() {
+  const absl::Duration timeout = services_.limits().import_idle_timeout;
+  const absl::Time now = absl::Now();
+  Phase phase;
+  absl::Time due;
+  {
+    MutexLock lock(&mu_);
+    phase = phase_;
+    due = std::min(waiting_since_, now) + timeout;
+    if (phase == Phase::kReceiving && due <= now) phase_ = Phase::kFinishing;  // a read that ends now is ignored
+  }
+  if (phase == Phase::kBuilding) return;
+  if (due > now || phase == Phase::kReceiving) WatchUntil(due > now ? due : now + timeout);
+  if (due > now) return;
+  if (phase == Phase::kReceiving) return services_.quick().Post([this] { EndIdle(); });
+  context_->TryCancel();  // a write is in flight that the peer does not read
+}
+
+void ImportReactor::EndIdle() {
+  importer_ = nullptr;
+  EndWith(ImportIdle(services_.limits().import_idle_timeout));
+}
+
 void ImportReactor::OnReadDone(bool ok) {
+  {
+    MutexLock lock(&mu_);
+    waiting_since_ = absl::InfiniteFuture();
+    if (phase_ == Phase::kFinishing) return;
+  }
   if (ok) return Post(services_.quick(), &ImportReactor::StageAndReadNext);
   if (importer_ == nullptr) {
     return EndWith(cancelled_ ? CallCancelled() : BadField("header", "an import begins with a header"));
@@ -32,7 +92,7 @@ void ImportReactor::OnReadDone(bool ok) {
 }
 
 void ImportReactor::Post(Executor& executor, void (ImportReactor::*step)()) {
-  const absl::Status posted = executor.TryPost([this, step] { (this->*step)(); });
+  const absl::Status posted = executor.TryPost([this, step] { (this->*step)(); }, request_.ByteSizeLong());
   if (!posted.ok()) EndWith(posted);
 }
 
@@ -46,7 +106,7 @@ void ImportReactor::StageAndReadNext() {
     next_report_ = importer_->num_received() + kItemsPerReport;
     WriteProgress(kReceiving, importer_->num_received(), importer_->num_announced());
   }
-  StartRead(&request_);
+  ReadNext();
 }
 
 absl::Status ImportReactor::Stage() {
@@ -67,6 +127,7 @@ void ImportReactor::Announce() {
   {
     MutexLock lock(&mu_);
     phase_ = Phase::kAnnouncing;
+    waiting_since_ = absl::Now();
     if (writing_) return;  // OnWriteDone comes back here
   }
   WriteProgress(kBuilding, 0, importer_->num_received());
@@ -119,6 +180,7 @@ void ImportReactor::EndWith(const absl::Status& status) {
   {
     MutexLock lock(&mu_);
     phase_ = Phase::kFinishing;
+    waiting_since_ = absl::Now();
     end_ = status;
     if (writing_) return;  // OnWriteDone comes back here
   }

@@ -17,20 +17,28 @@ namespace {
 constexpr int kDefaultSurfaceBits = 14;
 constexpr int kMaxPositionBits = 30;
 
+bool IsHeavySelection(const v1::Selection& selection, v1::EntityKind kind, const Session& session) {
+  const absl::StatusOr<EntityKind> known = ToEntityKind(kind, "kind");
+  return known.ok() && CountSelected(selection, session.num_live(*known)) > kManyRows;
+}
+
 class GetNeighborsReactor final : public ChunkStreamReactor<v1::GetNeighborsResponse> {
  public:
   GetNeighborsReactor(const ServiceContext& services, grpc::CallbackServerContext* context,
                       const v1::GetNeighborsRequest* request)
-      : ChunkStreamReactor("GetNeighbors", context), services_(services), request_(*request) {}
+      : ChunkStreamReactor("GetNeighbors", context, services), request_(*request) {}
 
  private:
-  absl::Status Gather() override {
+  bool IsHeavy(const Session& session) const override {
+    return IsHeavySelection(request_.selection(), request_.from(), session);
+  }
+
+  absl::Status Gather(const Session& session, const QueryTerms& terms, AccessGrant&) override {
     DYNMESH_RETURN_IF_ERROR(CheckMessageSize(request_, services_.limits()));
-    DYNMESH_ASSIGN_OR_RETURN(const SessionPtr session, services_.registry.Find(request_.session()));
     DYNMESH_ASSIGN_OR_RETURN(const Relation relation, ToRelation(request_));
     DYNMESH_ASSIGN_OR_RETURN(const Selection selection,
                              ToSelection(request_.selection(), request_.as_of_revision()));
-    DYNMESH_ASSIGN_OR_RETURN(answer_, QueryNeighbors(*session, relation, selection));
+    DYNMESH_ASSIGN_OR_RETURN(answer_, QueryNeighbors(session, relation, selection, terms));
     return absl::OkStatus();
   }
 
@@ -41,7 +49,6 @@ class GetNeighborsReactor final : public ChunkStreamReactor<v1::GetNeighborsResp
     return true;
   }
 
-  const ServiceContext services_;
   const v1::GetNeighborsRequest request_;
   NeighborsAnswer answer_;
   size_t next_ = 0;
@@ -51,16 +58,19 @@ class GetEntitiesReactor final : public ChunkStreamReactor<v1::GetEntitiesRespon
  public:
   GetEntitiesReactor(const ServiceContext& services, grpc::CallbackServerContext* context,
                      const v1::GetEntitiesRequest* request)
-      : ChunkStreamReactor("GetEntities", context), services_(services), request_(*request) {}
+      : ChunkStreamReactor("GetEntities", context, services), request_(*request) {}
 
  private:
-  absl::Status Gather() override {
+  bool IsHeavy(const Session& session) const override {
+    return IsHeavySelection(request_.selection(), request_.kind(), session);
+  }
+
+  absl::Status Gather(const Session& session, const QueryTerms& terms, AccessGrant&) override {
     DYNMESH_RETURN_IF_ERROR(CheckMessageSize(request_, services_.limits()));
-    DYNMESH_ASSIGN_OR_RETURN(const SessionPtr session, services_.registry.Find(request_.session()));
     DYNMESH_ASSIGN_OR_RETURN(const EntityKind kind, ToEntityKind(request_.kind(), "kind"));
     DYNMESH_ASSIGN_OR_RETURN(const Selection selection,
                              ToSelection(request_.selection(), request_.as_of_revision()));
-    DYNMESH_ASSIGN_OR_RETURN(answer_, QueryEntities(*session, kind, selection));
+    DYNMESH_ASSIGN_OR_RETURN(answer_, QueryEntities(session, kind, selection, terms));
     return absl::OkStatus();
   }
 
@@ -71,7 +81,6 @@ class GetEntitiesReactor final : public ChunkStreamReactor<v1::GetEntitiesRespon
     return true;
   }
 
-  const ServiceContext services_;
   const v1::GetEntitiesRequest request_;
   EntitiesAnswer answer_;
   size_t next_ = 0;
@@ -90,13 +99,14 @@ class GetBoundaryReactor final : public ChunkStreamReactor<v1::GetBoundaryRespon
  public:
   GetBoundaryReactor(const ServiceContext& services, grpc::CallbackServerContext* context,
                      const v1::GetBoundaryRequest* request)
-      : ChunkStreamReactor("GetBoundary", context), services_(services), request_(*request) {}
+      : ChunkStreamReactor("GetBoundary", context, services), request_(*request) {}
 
  private:
-  absl::Status Gather() override {
-    DYNMESH_ASSIGN_OR_RETURN(const SessionPtr session, services_.registry.Find(request_.session()));
+  bool IsHeavy(const Session&) const override { return false; }  // a list that is there already
+
+  absl::Status Gather(const Session& session, const QueryTerms& terms, AccessGrant&) override {
     DYNMESH_ASSIGN_OR_RETURN(const EntityKind kind, ToEntityKind(request_.kind(), "kind"));
-    DYNMESH_ASSIGN_OR_RETURN(answer_, QueryBoundary(*session, kind));
+    DYNMESH_ASSIGN_OR_RETURN(answer_, QueryBoundary(session, kind, terms));
     return absl::OkStatus();
   }
 
@@ -108,7 +118,6 @@ class GetBoundaryReactor final : public ChunkStreamReactor<v1::GetBoundaryRespon
     return true;
   }
 
-  const ServiceContext services_;
   const v1::GetBoundaryRequest request_;
   BoundaryAnswer answer_;
   size_t next_ = 0;
@@ -118,29 +127,34 @@ class GetBoundarySurfaceReactor final : public ChunkStreamReactor<v1::GetBoundar
  public:
   GetBoundarySurfaceReactor(const ServiceContext& services, grpc::CallbackServerContext* context,
                             const v1::GetBoundarySurfaceRequest* request)
-      : ChunkStreamReactor("GetBoundarySurface", context), services_(services), request_(*request) {}
+      : ChunkStreamReactor("GetBoundarySurface", context, services), request_(*request) {}
 
  private:
-  absl::Status Gather() override {
+  bool IsHeavy(const Session&) const override { return true; }
+
+  absl::Status Gather(const Session& session, const QueryTerms& terms, AccessGrant& grant) override {
     const int bits = request_.position_bits() == 0 ? kDefaultSurfaceBits : request_.position_bits();
     if (bits < 1 || bits > kMaxPositionBits)
       return BadField("position_bits", "position_bits is outside 0-30");
-    DYNMESH_ASSIGN_OR_RETURN(const SessionPtr session, services_.registry.Find(request_.session()));
-    DYNMESH_ASSIGN_OR_RETURN(answer_, QuerySurface(*session, bits));
+    DYNMESH_ASSIGN_OR_RETURN(SurfaceAnswer answer, QuerySurface(session, terms));
+    grant.Release();
+    DYNMESH_RETURN_IF_ERROR(terms.stop.Check());
+    revision_ = answer.revision;
+    DYNMESH_ASSIGN_OR_RETURN(drc_, EncodeSurface(answer.surface, bits));
     return absl::OkStatus();
   }
 
   absl::StatusOr<bool> NextChunk(v1::GetBoundarySurfaceResponse* response) override {
     std::pair<size_t, size_t> piece;
-    if (!TakePiece(answer_.drc, kChunkBytes, next_, piece)) return false;
-    response->set_revision(answer_.revision);
-    response->set_drc(answer_.drc.data() + piece.first, piece.second);
+    if (!TakePiece(drc_, kChunkBytes, next_, piece)) return false;
+    response->set_revision(revision_);
+    response->set_drc(drc_.data() + piece.first, piece.second);
     return true;
   }
 
-  const ServiceContext services_;
   const v1::GetBoundarySurfaceRequest request_;
-  SurfaceAnswer answer_;
+  int64_t revision_ = 0;
+  std::string drc_;
   size_t next_ = 0;
 };
 
@@ -150,22 +164,22 @@ class QueriesService final : public v1::QueryService::CallbackService {
 
   grpc::ServerWriteReactor<v1::GetNeighborsResponse>* GetNeighbors(
       grpc::CallbackServerContext* context, const v1::GetNeighborsRequest* request) override {
-    return (new GetNeighborsReactor(services_, context, request))->Start(services_.quick());
+    return (new GetNeighborsReactor(services_, context, request))->Start(request->session(), request->ByteSizeLong());
   }
 
   grpc::ServerWriteReactor<v1::GetEntitiesResponse>* GetEntities(
       grpc::CallbackServerContext* context, const v1::GetEntitiesRequest* request) override {
-    return (new GetEntitiesReactor(services_, context, request))->Start(services_.quick());
+    return (new GetEntitiesReactor(services_, context, request))->Start(request->session(), request->ByteSizeLong());
   }
 
   grpc::ServerWriteReactor<v1::GetBoundaryResponse>* GetBoundary(
       grpc::CallbackServerContext* context, const v1::GetBoundaryRequest* request) override {
-    return (new GetBoundaryReactor(services_, context, request))->Start(services_.quick());
+    return (new GetBoundaryReactor(services_, context, request))->Start(request->session(), request->ByteSizeLong());
   }
 
   grpc::ServerWriteReactor<v1::GetBoundarySurfaceResponse>* GetBoundarySurface(
       grpc::CallbackServerContext* context, const v1::GetBoundarySurfaceRequest* request) override {
-    return (new GetBoundarySurfaceReactor(services_, context, request))->Start(services_.heavy());
+    return (new GetBoundarySurfaceReactor(services_, context, request))->Start(request->session(), request->ByteSizeLong());
   }
 
  private:

@@ -6,10 +6,13 @@
 #include "core/mesh/error.h"
 #include "core/mesh/validate.h"
 #include "dynmesh/v1/sessions.grpc.pb.h"
+#include "server/rpc/call_stop.h"
 #include "server/rpc/chunk_stream.h"
 #include "server/rpc/convert_sessions.h"
 #include "server/rpc/import_reactor.h"
+#include "server/rpc/session_work.h"
 #include "server/rpc/unary.h"
+#include "server/session/catch_exceptions.h"
 #include "server/session/export.h"
 
 namespace dynmesh {
@@ -19,6 +22,7 @@ constexpr int kDefaultPageSize = 100;
 constexpr int kMaxPageSize = 1000;
 // A page ends early when its sessions, whose attribute lists may be long, hold this much.
 constexpr size_t kMaxPageBytes = size_t{1} << 20;
+constexpr uint64_t kManyEntities = 10'000'000;
 
 absl::Status CreateSession(const ServiceContext& services, const v1::CreateSessionRequest& request,
                            v1::CreateSessionResponse* response) {
@@ -30,63 +34,119 @@ absl::Status CreateSession(const ServiceContext& services, const v1::CreateSessi
   return absl::OkStatus();
 }
 
-absl::Status GetSession(const ServiceContext& services, const v1::GetSessionRequest& request,
-                        v1::GetSessionResponse* response) {
-  DYNMESH_ASSIGN_OR_RETURN(const SessionPtr session, services.registry.Find(request.name()));
-  DYNMESH_ASSIGN_OR_RETURN(const SessionInfo info, session->Info());
+absl::Status GetSession(const Session& session, v1::GetSessionResponse* response) {
+  DYNMESH_ASSIGN_OR_RETURN(const SessionInfo info, session.Info());
   *response->mutable_session() = FromSessionInfo(info);
   response->set_revision(info.revision);
   return absl::OkStatus();
 }
 
-absl::Status ListSessions(const ServiceContext& services, const v1::ListSessionsRequest& request,
-                          v1::ListSessionsResponse* response) {
-  if (request.page_size() < 0) return BadField("page_size", "page_size is negative");
-  const size_t size =
-      request.page_size() == 0 ? kDefaultPageSize : std::min(request.page_size(), kMaxPageSize);
-  DYNMESH_ASSIGN_OR_RETURN(const std::string after, FromPageToken(request.page_token()));
-  const std::vector<SessionPtr> sessions = services.registry.ListAfter(after, size + 1);
-  size_t bytes = 0;
-  for (size_t i = 0; i < sessions.size(); ++i) {
-    if (i == size || bytes > kMaxPageBytes) {
-      response->set_next_page_token(ToPageToken(sessions[i - 1]->name()));
-      break;
-    }
-    const absl::StatusOr<SessionInfo> info = sessions[i]->Info();
-    if (!info.ok()) continue;  // deleted meanwhile
-    *response->add_sessions() = FromSessionInfo(*info);
-    bytes += response->sessions().rbegin()->ByteSizeLong();
-  }
-  return absl::OkStatus();
+/// What is to be told of the sessions is scanned once for each revision: for many entities that takes a while.
+bool IsLarge(const Session& session) {
+  uint64_t entities = 0;
+  for (EntityKind kind : kEntityKinds) entities += session.num_live(kind);
+  return entities > kManyEntities;
 }
 
-absl::Status DeleteSession(const ServiceContext& services, const v1::DeleteSessionRequest& request,
-                           v1::DeleteSessionResponse* response) {
-  DYNMESH_ASSIGN_OR_RETURN(const int64_t revision, services.registry.Delete(request.name(), request.etag()));
+/// One ListSessions call: visits the sessions of a page one after the other, each when it is its turn there.
+/// Deletes itself.
+class ListSessionsCall {
+ public:
+  ListSessionsCall(const UnaryCall& call, v1::ListSessionsResponse* response)
+      : call_(call), reactor_(call.context->DefaultReactor()), response_(response) {}
+
+  grpc::ServerUnaryReactor* Start(const v1::ListSessionsRequest& request) {
+    grpc::ServerUnaryReactor* reactor = reactor_;  // this may be gone when Visit() returns
+    const absl::Status chosen = ChoosePage(request);
+    chosen.ok() ? Visit() : Finish(chosen);
+    return reactor;
+  }
+
+ private:
+  absl::Status ChoosePage(const v1::ListSessionsRequest& request) {
+    if (request.page_size() < 0) return BadField("page_size", "page_size is negative");
+    page_size_ = request.page_size() == 0 ? kDefaultPageSize : std::min(request.page_size(), kMaxPageSize);
+    DYNMESH_ASSIGN_OR_RETURN(const std::string after, FromPageToken(request.page_token()));
+    sessions_ = call_.services.registry.ListAfter(after, page_size_ + 1);
+    return absl::OkStatus();
+  }
+
+  void Visit() {
+    if (next_ == sessions_.size()) return Finish(absl::OkStatus());
+    if (next_ == page_size_ || bytes_ > kMaxPageBytes) {
+      response_->set_next_page_token(ToPageToken(sessions_[next_ - 1]->name()));
+      return Finish(absl::OkStatus());
+    }
+    const SessionPtr& session = sessions_[next_];
+    const absl::Status posted = PostWork(call_.services, session, {AccessMode::kRead, IsLarge(*session)},
+                                         [this](AccessGrant grant) { Describe(std::move(grant)); });
+    if (!posted.ok()) Finish(posted);
+  }
+
+  void Describe(AccessGrant grant) {
+    const absl::Status stopped = CallStop(call_.context).Check();
+    if (!stopped.ok()) return Finish(stopped);
+    const absl::Status described = CatchExceptions([this]() -> absl::Status {
+      DYNMESH_ASSIGN_OR_RETURN(const SessionInfo info, sessions_[next_]->Info());
+      *response_->add_sessions() = FromSessionInfo(info);
+      bytes_ += response_->sessions().rbegin()->ByteSizeLong();
+      return absl::OkStatus();
+    });
+    grant.Release();
+    if (!described.ok() && !absl::IsNotFound(described)) return Finish(described);
+    ++next_;  // one that is not found was deleted meanwhile
+    Visit();
+  }
+
+  void Finish(const absl::Status& status) {
+    reactor_->Finish(LoggedStatus(call_.rpc, status));
+    delete this;
+  }
+
+  const UnaryCall call_;
+  grpc::ServerUnaryReactor* const reactor_;
+  v1::ListSessionsResponse* const response_;
+  size_t page_size_ = 0;
+  std::vector<SessionPtr> sessions_;  ///< of the page, and the one after it
+  size_t next_ = 0;
+  size_t bytes_ = 0;
+};
+
+absl::Status DeleteSession(const ServiceContext& services, const SessionPtr& session,
+                           const v1::DeleteSessionRequest& request, v1::DeleteSessionResponse* response) {
+  DYNMESH_ASSIGN_OR_RETURN(const int64_t revision, services.registry.Delete(session, request.etag()));
   response->set_revision(revision);
   return absl::OkStatus();
 }
 
-absl::Status ValidateSession(const ServiceContext& services, const v1::ValidateSessionRequest& request,
+/// Checks a copy: nobody waits for the session meanwhile.
+absl::Status ValidateSession(const Session& session, const StopSignal& stop, AccessGrant grant,
                              v1::ValidateSessionResponse* response) {
-  DYNMESH_ASSIGN_OR_RETURN(const SessionPtr session, services.registry.Find(request.session()));
-  return session->Read([response](const SessionView& view) {
-    response->set_revision(view.mesh.revision());
-    for (std::string& violation : Validate(view.mesh)) response->add_violations(std::move(violation));
+  absl::optional<Mesh> copy;
+  DYNMESH_RETURN_IF_ERROR(session.Read([&copy](const SessionView& view) {
+    copy = view.mesh.Clone();
     return absl::OkStatus();
-  });
+  }));
+  grant.Release();
+  absl::Status stopped;
+  const auto goes_on = [&] { return (stopped = stop.Check()).ok(); };
+  std::vector<std::string> violations = Validate(*copy, {.goes_on = goes_on});
+  DYNMESH_RETURN_IF_ERROR(stopped);
+  response->set_revision(copy->revision());
+  for (std::string& violation : violations) response->add_violations(std::move(violation));
+  return absl::OkStatus();
 }
 
 class ExportMeshReactor final : public ChunkStreamReactor<v1::ExportMeshResponse> {
  public:
-  ExportMeshReactor(const ServiceContext& services, grpc::CallbackServerContext* context,
-                    const v1::ExportMeshRequest* request)
-      : ChunkStreamReactor("ExportMesh", context), services_(services), request_(*request) {}
+  ExportMeshReactor(const ServiceContext& services, grpc::CallbackServerContext* context)
+      : ChunkStreamReactor("ExportMesh", context, services) {}
 
  private:
-  absl::Status Gather() override {
-    DYNMESH_ASSIGN_OR_RETURN(const SessionPtr session, services_.registry.Find(request_.session()));
-    DYNMESH_ASSIGN_OR_RETURN(answer_, ExportSession(*session));
+  bool IsHeavy(const Session&) const override { return true; }
+
+  absl::Status Gather(const Session& session, const QueryTerms& terms, AccessGrant&) override {
+    DYNMESH_ASSIGN_OR_RETURN(answer_, ExportSession(session, terms));
     return absl::OkStatus();
   }
 
@@ -97,8 +157,6 @@ class ExportMeshReactor final : public ChunkStreamReactor<v1::ExportMeshResponse
     return true;
   }
 
-  const ServiceContext services_;
-  const v1::ExportMeshRequest request_;
   ExportAnswer answer_;
   size_t next_ = 0;
 };
@@ -117,39 +175,49 @@ class SessionsService final : public v1::SessionService::CallbackService {
   grpc::ServerUnaryReactor* GetSession(grpc::CallbackServerContext* context,
                                        const v1::GetSessionRequest* request,
                                        v1::GetSessionResponse* response) override {
-    return RunUnary("GetSession", context, services_.quick(),
-                    [=, this] { return dynmesh::GetSession(services_, *request, response); });
+    const absl::StatusOr<SessionPtr> found = services_.registry.Find(request->name());
+    const bool heavy = found.ok() && IsLarge(**found);
+    return RunOnSession({"GetSession", context, services_}, request->name(), {AccessMode::kRead, heavy},
+                        [response](const SessionPtr& session, AccessGrant) {
+                          return dynmesh::GetSession(*session, response);
+                        });
   }
 
   grpc::ServerUnaryReactor* ListSessions(grpc::CallbackServerContext* context,
                                          const v1::ListSessionsRequest* request,
                                          v1::ListSessionsResponse* response) override {
-    return RunUnary("ListSessions", context, services_.quick(),
-                    [=, this] { return dynmesh::ListSessions(services_, *request, response); });
+    return (new ListSessionsCall({"ListSessions", context, services_}, response))->Start(*request);
   }
 
   grpc::ServerUnaryReactor* DeleteSession(grpc::CallbackServerContext* context,
                                           const v1::DeleteSessionRequest* request,
                                           v1::DeleteSessionResponse* response) override {
-    return RunUnary("DeleteSession", context, services_.quick(),
-                    [=, this] { return dynmesh::DeleteSession(services_, *request, response); });
+    return RunOnSession({"DeleteSession", context, services_}, request->name(), {AccessMode::kWrite},
+                        [this, request, response](const SessionPtr& session, AccessGrant) {
+                          return dynmesh::DeleteSession(services_, session, *request, response);
+                        });
   }
 
   grpc::ServerUnaryReactor* ValidateSession(grpc::CallbackServerContext* context,
                                             const v1::ValidateSessionRequest* request,
                                             v1::ValidateSessionResponse* response) override {
-    return RunUnary("ValidateSession", context, services_.heavy(),
-                    [=, this] { return dynmesh::ValidateSession(services_, *request, response); });
+    return RunOnSession({"ValidateSession", context, services_}, request->session(),
+                        {AccessMode::kRead, /*heavy=*/true},
+                        [context, response](const SessionPtr& session, AccessGrant grant) {
+                          return dynmesh::ValidateSession(*session, CallStop(context), std::move(grant),
+                                                          response);
+                        });
   }
 
   grpc::ServerBidiReactor<v1::ImportMeshRequest, v1::ImportMeshResponse>* ImportMesh(
-      grpc::CallbackServerContext*) override {
-    return (new ImportReactor(services_))->Start();
+      grpc::CallbackServerContext* context) override {
+    return (new ImportReactor(services_, context))->Start();
   }
 
   grpc::ServerWriteReactor<v1::ExportMeshResponse>* ExportMesh(
       grpc::CallbackServerContext* context, const v1::ExportMeshRequest* request) override {
-    return (new ExportMeshReactor(services_, context, request))->Start(services_.heavy());
+    return (new ExportMeshReactor(services_, context))
+        ->Start(request->session(), request->ByteSizeLong());
   }
 
  private:

@@ -33,8 +33,8 @@ void StreamEditsReactor::OnReadDone(bool ok) {
     reading_ = false;
     closed_ = !ok;
     if (ok) {
-      request_bytes_ += reading_into_.ByteSizeLong();
-      requests_.push_back(std::move(reading_into_));
+      requests_.push_back(Admit(std::move(*reading_into_.mutable_batch())));
+      request_bytes_ += requests_.back().bytes.held();
     }
   }
   Pump();
@@ -124,7 +124,7 @@ void StreamEditsReactor::Do(Action action) {
   } else if (action == Action::kWrite) {
     StartWrite(&writing_from_);
   } else if (action == Action::kApply) {
-    services_.quick().Post([this] { ApplyQueued(); });
+    PostApply();
   } else if (action == Action::kFinish) {
     absl::Status status;
     {
@@ -135,25 +135,75 @@ void StreamEditsReactor::Do(Action action) {
   }
 }
 
-void StreamEditsReactor::ApplyQueued() {
-  v1::StreamEditsRequest request;
-  for (int i = 0; i < kBatchesInARow && TakeRequest(&request); ++i) {
-    v1::StreamEditsResponse response;
-    const absl::Status status =
-        CatchExceptions([&] { return ApplyEdits(services_, request.batch(), response.mutable_applied()); });
-    if (!status.ok()) FromError(status, response.mutable_error());
-    Answer(std::move(response));
+StreamEditsReactor::Request StreamEditsReactor::Admit(v1::ApplyEditsRequest batch) const {
+  Request request{{}, Lease(services_.quick().queued_bytes()), absl::OkStatus()};
+  request.refused = request.bytes.Grow(MemoryOf(batch));
+  if (request.refused.ok()) {
+    request.batch = std::move(batch);
+  } else {
+    request.batch.set_session(batch.session());
   }
-  StopApplying();
+  return request;
 }
 
-bool StreamEditsReactor::TakeRequest(v1::StreamEditsRequest* request) {
+void StreamEditsReactor::PostApply() {
+  std::string name;
+  {
+    MutexLock lock(&mu_);
+    name = requests_.front().batch.session();
+  }
+  const absl::StatusOr<SessionPtr> session = services_.registry.Find(name);
+  if (!session.ok()) {
+    // Not at once: a stream of such batches would keep this thread, which is gRPC's.
+    return services_.quick().Post([this, status = session.status()] {
+      Request request;
+      if (TakeFirst(&request)) Refuse(status, 0);
+      StopApplying();
+    });
+  }
+  (*session)->access().Post(AccessMode::kWrite, services_.quick(),
+                            [this, session = *session](AccessGrant grant) {
+                              ApplyQueued(session);
+                              grant.Release();
+                              StopApplying();
+                            });
+}
+
+void StreamEditsReactor::ApplyQueued(const SessionPtr& session) {
+  Request request;
+  for (int i = 0; i < kBatchesInARow && TakeRequest(session, &request); ++i) ApplyOne(session, request);
+}
+
+void StreamEditsReactor::ApplyOne(const SessionPtr& session, const Request& request) {
+  if (!request.refused.ok()) return Refuse(request.refused, session->revision());
+  v1::StreamEditsResponse response;
+  const absl::Status status =
+      CatchExceptions([&] { return ApplyEdits(*session, request.batch, response.mutable_applied()); });
+  status.ok() ? Answer(std::move(response)) : Refuse(status, session->revision());
+}
+
+bool StreamEditsReactor::TakeRequest(const SessionPtr& session, Request* request) {
+  {
+    MutexLock lock(&mu_);
+    if (!requests_.empty() && requests_.front().batch.session() != session->name()) return false;
+  }
+  return TakeFirst(request);
+}
+
+bool StreamEditsReactor::TakeFirst(Request* request) {
   MutexLock lock(&mu_);
   if (requests_.empty() || responses_.size() >= kMaxQueued || broken_) return false;
   *request = std::move(requests_.front());
   requests_.pop_front();
-  request_bytes_ -= request->ByteSizeLong();
+  request_bytes_ -= request->bytes.held();
   return true;
+}
+
+void StreamEditsReactor::Refuse(const absl::Status& status, int64_t revision) {
+  v1::StreamEditsResponse response;
+  FromError(status, response.mutable_error());
+  response.mutable_error()->set_revision(revision);
+  Answer(std::move(response));
 }
 
 void StreamEditsReactor::Answer(v1::StreamEditsResponse response) {

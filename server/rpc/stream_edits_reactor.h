@@ -9,14 +9,17 @@
 #include "grpcpp/support/server_callback.h"
 #include "server/rpc/open_streams.h"
 #include "server/rpc/service_context.h"
+#include "server/session/budget.h"
 #include "server/session/mutex.h"
 
 namespace dynmesh {
 
 /// One StreamEdits call: three stages that run at the same time, with a short queue between each two.
 ///
-///     read ──> requests_ ──> apply (executor) ──> responses_ ──> write
+///     read ──> requests_ ──> apply (its turn at the session) ──> responses_ ──> write
 ///
+/// Batches wait for their session without a thread, and one after the other for the same session share a turn.
+/// What waits counts against the daemon's max_queued_bytes; a batch that found no room there is refused.
 /// Batches are applied and answered in order; a refused one is answered in band. A peer that does not read
 /// its answers is not read from either. The stream ends OK when the peer has half-closed and has all answers,
 /// and with UNAVAILABLE SHUTTING_DOWN, after the answers to what was read, when the server drains. Deletes
@@ -35,6 +38,13 @@ class StreamEditsReactor final
   void OnDone() override;
 
  private:
+  /// A batch that was read.
+  struct Request {
+    v1::ApplyEditsRequest batch;
+    Lease bytes;
+    absl::Status refused;  ///< not OK: found no room; the batch is empty then, but for its session
+  };
+
   enum class Action { kNone, kRead, kApply, kWrite, kFinish };
 
   /// Does what there is to do. One thread at a time is in here: who comes meanwhile leaves it to that thread.
@@ -46,8 +56,16 @@ class StreamEditsReactor final
   bool IsOver() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
   absl::Status EndStatus() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
   void Do(Action action) ABSL_LOCKS_EXCLUDED(mu_);
-  void ApplyQueued();
-  bool TakeRequest(v1::StreamEditsRequest* request) ABSL_LOCKS_EXCLUDED(mu_);
+  /// What was read, with its share of max_queued_bytes.
+  Request Admit(v1::ApplyEditsRequest batch) const;
+  /// Asks for a turn at the session of the first request.
+  void PostApply() ABSL_LOCKS_EXCLUDED(mu_);
+  void ApplyQueued(const SessionPtr& session);
+  void ApplyOne(const SessionPtr& session, const Request& request);
+  /// The next request, if it is for `session`.
+  bool TakeRequest(const SessionPtr& session, Request* request) ABSL_LOCKS_EXCLUDED(mu_);
+  bool TakeFirst(Request* request) ABSL_LOCKS_EXCLUDED(mu_);
+  void Refuse(const absl::Status& status, int64_t revision) ABSL_LOCKS_EXCLUDED(mu_);
   void Answer(v1::StreamEditsResponse response) ABSL_LOCKS_EXCLUDED(mu_);
   void StopApplying() ABSL_LOCKS_EXCLUDED(mu_);
 
@@ -56,7 +74,7 @@ class StreamEditsReactor final
   v1::StreamEditsResponse writing_from_;
 
   Mutex mu_;
-  std::deque<v1::StreamEditsRequest> requests_ ABSL_GUARDED_BY(mu_);
+  std::deque<Request> requests_ ABSL_GUARDED_BY(mu_);
   std::deque<v1::StreamEditsResponse> responses_ ABSL_GUARDED_BY(mu_);
   size_t request_bytes_ ABSL_GUARDED_BY(mu_) = 0;  ///< of requests_
   bool pumping_ ABSL_GUARDED_BY(mu_) = false;      ///< for ever, once the call is finished

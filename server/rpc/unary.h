@@ -1,12 +1,16 @@
 #ifndef DYNMESH_SERVER_RPC_UNARY_H_
 #define DYNMESH_SERVER_RPC_UNARY_H_
 
+#include <string>
 #include <utility>
 
 #include "absl/status/status.h"
 #include "google/protobuf/message_lite.h"
 #include "grpcpp/server_context.h"
 #include "grpcpp/support/server_callback.h"
+#include "server/rpc/call_stop.h"
+#include "server/rpc/service_context.h"
+#include "server/rpc/session_work.h"
 #include "server/rpc/status.h"
 #include "server/session/catch_exceptions.h"
 #include "server/session/executor.h"
@@ -22,6 +26,13 @@ inline absl::Status CheckMessageSize(const google::protobuf::MessageLite& messag
   return LimitExceeded("max_message_bytes", limits.max_message_bytes, bytes);
 }
 
+/// A unary call as its service sees it.
+struct UnaryCall {
+  const char* rpc;  ///< the method's name, for the log
+  grpc::CallbackServerContext* context;
+  const ServiceContext& services;  ///< outlives the call
+};
+
 /// Answers a unary call by fn(), run on `executor`; fn returns an absl::Status and fills the response before.
 /// A call that was cancelled while it waited is not run.
 template <typename Fn>
@@ -33,6 +44,27 @@ grpc::ServerUnaryReactor* RunUnary(const char* rpc, grpc::CallbackServerContext*
     reactor->Finish(LoggedStatus(rpc, status));
   });
   if (!posted.ok()) reactor->Finish(LoggedStatus(rpc, posted));
+  return reactor;
+}
+
+/// Answers a unary call by fn(session, grant), run when it is its turn at the session of that name.
+template <typename Fn>
+grpc::ServerUnaryReactor* RunOnSession(const UnaryCall& call, const std::string& session_name,
+                                       const SessionWork& work, Fn fn) {
+  grpc::ServerUnaryReactor* reactor = call.context->DefaultReactor();
+  const absl::StatusOr<SessionPtr> session = call.services.registry.Find(session_name);
+  absl::Status posted = session.status();
+  if (session.ok()) {
+    auto task = [call, reactor, session = *session, fn = std::move(fn)](AccessGrant grant) mutable {
+      const absl::Status stopped = CallStop(call.context).Check();
+      const absl::Status status =
+          stopped.ok() ? CatchExceptions([&] { return fn(session, std::move(grant)); }) : stopped;
+      grant.Release();
+      reactor->Finish(LoggedStatus(call.rpc, status));
+    };
+    posted = PostWork(call.services, *session, work, std::move(task));
+  }
+  if (!posted.ok()) reactor->Finish(LoggedStatus(call.rpc, posted));
   return reactor;
 }
 

@@ -56,14 +56,21 @@ void DeltaSource::Get(const DeltaKey& key, Callback done) {
           return;
         }
       }
-      pending_.push_back({key, {}});
+      Pending& pending = pending_.emplace_back(Pending{key, {}});
+      pending.waiting.push_back(std::move(done));
     }
   }
   if (kept != nullptr) return done(kept);
-  const absl::StatusOr<PayloadPtr> made = CatchExceptions([&] { return Make(key); });
-  std::vector<Callback> waiting = Publish(key, made);
-  Deliver(std::move(waiting), made);
-  done(made);
+  session_.access().Post(AccessMode::kRead, *session_.workers().quick,
+                         [session = session_.shared_from_this(), key](AccessGrant grant) {
+                           session->deltas().MakePending(key, std::move(grant));
+                         });
+}
+
+void DeltaSource::MakePending(const DeltaKey& key, AccessGrant grant) {
+  const absl::StatusOr<PayloadPtr> made = CatchExceptions([&] { return Make(key, grant); });
+  grant.Release();
+  Deliver(Publish(key, made), made);
 }
 
 PayloadPtr DeltaSource::FindKept(const DeltaKey& key) const {
@@ -102,7 +109,7 @@ void DeltaSource::Forget() {
 }
 
 void DeltaSource::Deliver(std::vector<Callback> waiting, const absl::StatusOr<PayloadPtr>& payload) {
-  for (size_t begin = 0; begin < waiting.size(); begin += kDeliveryBatch) {
+  for (size_t begin = kDeliveryBatch; begin < waiting.size(); begin += kDeliveryBatch) {
     const size_t end = std::min(waiting.size(), begin + kDeliveryBatch);
     std::vector<Callback> batch(std::make_move_iterator(waiting.begin() + begin),
                                 std::make_move_iterator(waiting.begin() + end));
@@ -110,13 +117,15 @@ void DeltaSource::Deliver(std::vector<Callback> waiting, const absl::StatusOr<Pa
       for (Callback& callback : batch) callback(payload);
     });
   }
+  for (size_t i = 0; i < std::min(waiting.size(), kDeliveryBatch); ++i) waiting[i](payload);
 }
 
-absl::StatusOr<PayloadPtr> DeltaSource::Make(const DeltaKey& key) {
+absl::StatusOr<PayloadPtr> DeltaSource::Make(const DeltaKey& key, AccessGrant& grant) {
   Delta delta;
   EncodeOptions options;
   options.codec = key.codec;
   auto payload = std::make_shared<Payload>();
+  payload->session_uid = session_.uid();
   payload->next = key.cursor;
   DYNMESH_RETURN_IF_ERROR(session_.Read([&](const SessionView& view) {
     const Mesh& mesh = view.mesh;
@@ -129,6 +138,7 @@ absl::StatusOr<PayloadPtr> DeltaSource::Make(const DeltaKey& key) {
     if (key.position_bits > 0 && !delta.positions.empty()) options.grid = GridFor(key.position_bits, view);
     return absl::OkStatus();
   }));
+  grant.Release();
   payload->from_revision = delta.from_revision;
   payload->revision = delta.to_revision;
   payload->consistent = delta.consistent;

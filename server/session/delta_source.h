@@ -16,6 +16,7 @@
 #include "absl/types/optional.h"
 #include "core/codec/codec.h"
 #include "core/delta/diff.h"
+#include "server/session/access_queue.h"
 #include "server/session/mutex.h"
 
 namespace dynmesh {
@@ -25,6 +26,7 @@ struct SessionView;
 
 /// An encoded delta and what a follower needs to know of it. Shared by all followers that ask for the same.
 struct Payload {
+  std::string session_uid;
   int64_t from_revision = 0;
   int64_t revision = 0;    ///< of the session when it was made
   bool consistent = true;  ///< false: one part of a longer answer
@@ -73,8 +75,8 @@ class DeltaSource {
 
   explicit DeltaSource(Session& session) : session_(session) {}
 
-  /// Calls `done` with the payload: before returning if this call makes it or it is kept, else from a thread
-  /// of the executor. To be called from an executor's thread, without locks.
+  /// Calls `done` with the payload: before returning if it is kept, else from a thread of the executor, when
+  /// it is the session's turn to be read. To be called without locks. Never waits.
   /// Errors: those of Session::Read and EncodeDelta.
   void Get(const DeltaKey& key, Callback done);
 
@@ -98,7 +100,10 @@ class DeltaSource {
   std::vector<Callback> Publish(const DeltaKey& key, const absl::StatusOr<PayloadPtr>& payload);
   void Keep(const DeltaKey& key, PayloadPtr payload) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
   void Deliver(std::vector<Callback> waiting, const absl::StatusOr<PayloadPtr>& payload);
-  absl::StatusOr<PayloadPtr> Make(const DeltaKey& key);
+  /// Makes the payload that is pending, and delivers it.
+  void MakePending(const DeltaKey& key, AccessGrant grant);
+  /// Gives the grant back before it encodes.
+  absl::StatusOr<PayloadPtr> Make(const DeltaKey& key, AccessGrant& grant);
   QuantizationGrid GridFor(int bits, const SessionView& view);
 
   Session& session_;

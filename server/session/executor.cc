@@ -9,24 +9,36 @@
 
 namespace dynmesh {
 
-Executor::Executor(const Options& options) : options_(options) {
+Executor::Executor(const Options& options)
+    : options_(options),
+      places_(std::make_shared<Budget>("max_queued_tasks", options.max_queued)),
+      bytes_(std::make_shared<Budget>("max_queued_bytes", options.max_queued_bytes)) {
   for (int i = 0; i < options.threads; ++i) threads_.emplace_back([this] { Work(); });
 }
 
-absl::Status Executor::TryPost(Task task) {
-  MutexLock lock(&mu_);
-  if (stopping_) return ShuttingDown();
-  if (queue_.size() >= options_.max_queued) {
-    return LimitExceeded("max_queued_tasks", options_.max_queued, queue_.size() + 1);
+absl::StatusOr<Executor::Ticket> Executor::Admit(size_t bytes) {
+  {
+    MutexLock lock(&mu_);
+    if (stopping_) return ShuttingDown();
   }
-  queue_.push_back(std::move(task));
-  has_work_or_stops_.NotifyOne();
+  Ticket ticket{Lease(places_), Lease(bytes_)};
+  DYNMESH_RETURN_IF_ERROR(ticket.place.Grow(1));
+  DYNMESH_RETURN_IF_ERROR(ticket.bytes.Grow(bytes));
+  return ticket;
+}
+
+absl::Status Executor::TryPost(Task task, size_t bytes) {
+  DYNMESH_ASSIGN_OR_RETURN(Ticket ticket, Admit(bytes));
+  Post([ticket = std::move(ticket), task = std::move(task)]() mutable {
+    ticket = {};
+    task();
+  });
   return absl::OkStatus();
 }
 
 void Executor::Post(Task task) {
   MutexLock lock(&mu_);
-  if (stopping_) return;
+  if (stopping_) return;  // the caller destroys the task, without the lock
   queue_.push_back(std::move(task));
   has_work_or_stops_.NotifyOne();
 }

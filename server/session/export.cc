@@ -3,13 +3,16 @@
 #include <algorithm>
 #include <utility>
 
+#include "absl/functional/function_ref.h"
+#include "core/mesh/error.h"
+
 namespace dynmesh {
 namespace {
 
 /// Walks a mesh and cuts what it finds into chunks.
 class Exporter {
  public:
-  Exporter(const Mesh& mesh, uint64_t max_bytes) : mesh_(mesh), budget_(max_bytes) {}
+  Exporter(const Mesh& mesh, const QueryBudget& budget) : mesh_(mesh), budget_(budget) {}
 
   absl::StatusOr<std::vector<ExportChunk>> Run() && {
     DYNMESH_RETURN_IF_ERROR(Vertices());
@@ -23,7 +26,7 @@ class Exporter {
   /// Room for `bytes` more in the last chunk, which is a `Chunk`; `fresh` starts the next one.
   template <typename Chunk>
   absl::StatusOr<Chunk*> Room(size_t bytes, const Chunk& fresh) {
-    DYNMESH_RETURN_IF_ERROR(budget_.Charge(bytes));
+    DYNMESH_RETURN_IF_ERROR(budget_.ChargeBytes(bytes));
     if (chunk_bytes_ == 0 || chunk_bytes_ + bytes > kChunkBytes) {
       chunks_.emplace_back(fresh);
       chunk_bytes_ = 0;
@@ -32,9 +35,17 @@ class Exporter {
     return &std::get<Chunk>(chunks_.back());
   }
 
+  /// Calls fn for each live slot of a kind.
+  absl::Status ForEachLive(EntityKind kind, absl::FunctionRef<absl::Status(Slot)> fn) {
+    return ForEachSelected(mesh_, kind, {}, [&](Slot slot) -> absl::Status {
+      DYNMESH_RETURN_IF_ERROR(budget_.ChargeSteps(1));
+      return fn(slot);
+    });
+  }
+
   absl::Status Vertices() {
     chunk_bytes_ = 0;
-    return ForEachSelected(mesh_, EntityKind::kVertex, {}, [this](Slot slot) -> absl::Status {
+    return ForEachLive(EntityKind::kVertex, [this](Slot slot) -> absl::Status {
       DYNMESH_ASSIGN_OR_RETURN(ExportedVertices * chunk,
                                Room(sizeof(Slot) + sizeof(Point), ExportedVertices()));
       chunk->ids.push_back(slot);
@@ -47,7 +58,7 @@ class Exporter {
     if (mesh_.NumElements(KindOf(type)) == 0) return absl::OkStatus();
     chunk_bytes_ = 0;
     const size_t bytes = (1 + NumVertices(type)) * sizeof(Slot);
-    return ForEachSelected(mesh_, KindOf(type), {}, [&](Slot slot) -> absl::Status {
+    return ForEachLive(KindOf(type), [&](Slot slot) -> absl::Status {
       const EntityId id(KindOf(type), slot);
       if (mesh_.Type(id) != type || !mesh_.IsElement(id)) return absl::OkStatus();
       DYNMESH_ASSIGN_OR_RETURN(ExportedElements * chunk, Room(bytes, ExportedElements{type, {}, {}}));
@@ -64,7 +75,7 @@ class Exporter {
     const ExportedRows fresh{spec, {}, {}};
     chunks_.emplace_back(fresh);
     chunk_bytes_ = 1;
-    return ForEachSelected(mesh_, spec.kind, {}, [&](Slot slot) -> absl::Status {
+    return ForEachLive(spec.kind, [&](Slot slot) -> absl::Status {
       if (!Travels(column, slot)) return absl::OkStatus();
       DYNMESH_ASSIGN_OR_RETURN(ExportedRows * chunk, Room(sizeof(Slot) + spec.row_bytes(), fresh));
       const auto row = column.Row(slot);
@@ -88,11 +99,11 @@ class Exporter {
 
 }  // namespace
 
-absl::StatusOr<ExportAnswer> ExportSession(const Session& session) {
+absl::StatusOr<ExportAnswer> ExportSession(const Session& session, const QueryTerms& terms) {
   ExportAnswer answer;
   const auto chunks = [&](const SessionView& view) {
     answer.revision = view.mesh.revision();
-    return Exporter(view.mesh, session.limits().max_query_bytes).Run();
+    return Exporter(view.mesh, QueryBudget(session.limits(), terms)).Run();
   };
   DYNMESH_ASSIGN_OR_RETURN(answer.chunks, session.ReadAs<std::vector<ExportChunk>>(chunks));
   return answer;

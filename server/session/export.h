@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "server/session/query_budget.h"
 #include "server/session/selection.h"
 #include "server/session/session.h"
 
@@ -35,9 +36,9 @@ struct ExportAnswer {
   std::vector<ExportChunk> chunks;
 };
 
-/// Gathered under one reader lock. Errors: RESOURCE_EXHAUSTED LIMIT_EXCEEDED (max_query_bytes): subscribe
-/// instead, which has no such limit.
-absl::StatusOr<ExportAnswer> ExportSession(const Session& session);
+/// Gathered under one reader lock. Errors: those of QueryBudget; beyond max_query_bytes subscribe instead, which
+/// has no such limit.
+absl::StatusOr<ExportAnswer> ExportSession(const Session& session, const QueryTerms& terms = {});
 
 }  // namespace dynmesh
 

@@ -12,7 +12,11 @@ namespace {
 constexpr int kMaxPositionBits = 30;
 constexpr absl::Duration kMaxInterval = absl::Hours(1);
 
-absl::Status CheckOptions(const FollowOptions& options, int64_t revision) {
+absl::Status CheckOptions(const FollowOptions& options, const Session& session) {
+  if (!options.session_uid.empty() && options.session_uid != session.uid()) {
+    return SessionRecreated(session.name(), options.session_uid, session.uid());
+  }
+  const int64_t revision = session.revision();
   if (options.from_revision < 0) return BadField("from_revision", "from_revision is negative");
   if (options.from_revision > revision) return RevisionInFuture(options.from_revision, revision);
   if (options.position_bits < 0 || options.position_bits > kMaxPositionBits) {
@@ -39,7 +43,7 @@ absl::Status Follower::Begin() {
     MutexLock lock(&mu_);
     session = session_;
   }
-  absl::Status begun = CheckOptions(options_, session->revision());
+  absl::Status begun = CheckOptions(options_, *session);
   if (begun.ok()) begun = session->followers().Add(shared_from_this());
   MutexLock lock(&mu_);
   if (begun.ok()) {

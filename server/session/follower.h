@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <string>
 
 #include "absl/base/thread_annotations.h"
 #include "absl/status/status.h"
@@ -31,6 +32,7 @@ class DeltaSink {
 
 struct FollowOptions {
   int64_t from_revision = 0;
+  std::string session_uid = {};  ///< of the session that from_revision is of; empty: not known
   Codec codec = Codec::kUnspecified;
   int position_bits = 0;                               ///< 0: lossless
   absl::Duration min_interval = absl::ZeroDuration();  ///< at least this long between consistent deltas
@@ -54,7 +56,7 @@ class Follower : public std::enable_shared_from_this<Follower> {
   Follower(SessionPtr session, const FollowOptions& options, DeltaSink* sink);
 
   /// Adds this to its session and starts. When it fails, the sink is never called.
-  /// Errors: INVALID_ARGUMENT BAD_ARGUMENT; OUT_OF_RANGE REVISION_IN_FUTURE; RESOURCE_EXHAUSTED
+  /// Errors: INVALID_ARGUMENT BAD_ARGUMENT; ABORTED SESSION_RECREATED; OUT_OF_RANGE REVISION_IN_FUTURE; RESOURCE_EXHAUSTED
   /// LIMIT_EXCEEDED; NOT_FOUND SESSION_DELETED; UNAVAILABLE SHUTTING_DOWN.
   absl::Status Begin();
 

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "core/mesh/error.h"
+#include "server/session/row_walk.h"
 
 namespace dynmesh {
 namespace {
@@ -10,15 +11,14 @@ namespace {
 /// Cuts rows of neighbours into chunks.
 class NeighborsBuilder {
  public:
-  NeighborsBuilder(const Mesh& mesh, Relation relation, uint64_t max_bytes)
-      : mesh_(mesh), relation_(relation), budget_(max_bytes) {
+  NeighborsBuilder(const Mesh& mesh, Relation relation, QueryBudget& budget)
+      : walk_(mesh, relation, budget), budget_(budget) {
     chunks_.emplace_back();
   }
 
   absl::Status AddRow(Slot slot) {
-    row_.clear();
-    AppendNeighbors(mesh_, relation_, slot, row_);
-    DYNMESH_RETURN_IF_ERROR(budget_.Charge(row_.size() * sizeof(Slot) + kRowBytes));
+    DYNMESH_RETURN_IF_ERROR(walk_.Walk(slot, row_));
+    DYNMESH_RETURN_IF_ERROR(budget_.ChargeBytes(row_.size() * sizeof(Slot) + kRowBytes));
     size_t cut = 0;
     if (row_.size() > kPieceIds) {
       cut = CutLongRow();
@@ -59,9 +59,8 @@ class NeighborsBuilder {
     return cut;
   }
 
-  const Mesh& mesh_;
-  const Relation relation_;
-  QueryBudget budget_;
+  RowWalk walk_;
+  QueryBudget& budget_;
   std::vector<Slot> row_;
   size_t first_offset_ = 0;  ///< neighbours of the last chunk's first row that earlier chunks hold
   std::vector<NeighborsChunk> chunks_;
@@ -70,8 +69,8 @@ class NeighborsBuilder {
 /// Gathers what there is to say of entities of one kind.
 class EntitiesBuilder {
  public:
-  EntitiesBuilder(const Mesh& mesh, EntityKind kind, uint64_t max_bytes)
-      : mesh_(mesh), kind_(kind), budget_(max_bytes) {
+  EntitiesBuilder(const Mesh& mesh, EntityKind kind, QueryBudget& budget)
+      : mesh_(mesh), kind_(kind), budget_(budget) {
     StartChunk();
   }
 
@@ -79,7 +78,8 @@ class EntitiesBuilder {
     const size_t row_bytes = kind_ == EntityKind::kVertex
                                  ? kFixedBytes + sizeof(Point)
                                  : kFixedBytes + (2 + mesh_.VerticesOf({kind_, slot}).size()) * sizeof(Slot);
-    DYNMESH_RETURN_IF_ERROR(budget_.Charge(row_bytes));
+    DYNMESH_RETURN_IF_ERROR(budget_.ChargeSteps(1));
+    DYNMESH_RETURN_IF_ERROR(budget_.ChargeBytes(row_bytes));
     if (chunk_bytes_ + row_bytes > kChunkBytes) StartChunk();
     chunk_bytes_ += row_bytes;
     Append(EntityId(kind_, slot), chunks_.back());
@@ -118,30 +118,31 @@ class EntitiesBuilder {
 
   const Mesh& mesh_;
   const EntityKind kind_;
-  QueryBudget budget_;
+  QueryBudget& budget_;
   size_t chunk_bytes_ = 0;
   std::vector<EntitiesChunk> chunks_;
 };
 
 absl::StatusOr<NeighborsAnswer> GatherNeighbors(const Mesh& mesh, Relation relation,
-                                                const Selection& selection, uint64_t max_bytes) {
-  NeighborsBuilder builder(mesh, relation, max_bytes);
+                                                const Selection& selection, QueryBudget budget) {
+  NeighborsBuilder builder(mesh, relation, budget);
   DYNMESH_RETURN_IF_ERROR(
       ForEachSelected(mesh, relation.from, selection, [&](Slot slot) { return builder.AddRow(slot); }));
   return NeighborsAnswer{mesh.revision(), std::move(builder).Take()};
 }
 
 absl::StatusOr<EntitiesAnswer> GatherEntities(const Mesh& mesh, EntityKind kind, const Selection& selection,
-                                              uint64_t max_bytes) {
-  EntitiesBuilder builder(mesh, kind, max_bytes);
+                                              QueryBudget budget) {
+  EntitiesBuilder builder(mesh, kind, budget);
   DYNMESH_RETURN_IF_ERROR(
       ForEachSelected(mesh, kind, selection, [&](Slot slot) { return builder.Add(slot); }));
   return EntitiesAnswer{mesh.revision(), std::move(builder).Take()};
 }
 
-absl::StatusOr<BoundaryAnswer> GatherBoundary(const Mesh& mesh, EntityKind kind, uint64_t max_bytes) {
+absl::StatusOr<BoundaryAnswer> GatherBoundary(const Mesh& mesh, EntityKind kind, QueryBudget budget) {
   const BitSet& boundary = mesh.Boundary(kind);
-  DYNMESH_RETURN_IF_ERROR(QueryBudget(max_bytes).Charge(boundary.size() * sizeof(Slot)));
+  DYNMESH_RETURN_IF_ERROR(budget.ChargeSteps(boundary.size()));
+  DYNMESH_RETURN_IF_ERROR(budget.ChargeBytes(boundary.size() * sizeof(Slot)));
   BoundaryAnswer answer{mesh.revision(), {}};
   answer.ids.reserve(boundary.size());
   boundary.ForEach([&](Slot slot) { answer.ids.push_back(slot); });
@@ -151,25 +152,26 @@ absl::StatusOr<BoundaryAnswer> GatherBoundary(const Mesh& mesh, EntityKind kind,
 }  // namespace
 
 absl::StatusOr<NeighborsAnswer> QueryNeighbors(const Session& session, Relation relation,
-                                               const Selection& selection) {
+                                               const Selection& selection, const QueryTerms& terms) {
   return session.ReadAs<NeighborsAnswer>([&](const SessionView& view) {
-    return GatherNeighbors(view.mesh, relation, selection, session.limits().max_query_bytes);
+    return GatherNeighbors(view.mesh, relation, selection, QueryBudget(session.limits(), terms));
   });
 }
 
 absl::StatusOr<EntitiesAnswer> QueryEntities(const Session& session, EntityKind kind,
-                                             const Selection& selection) {
+                                             const Selection& selection, const QueryTerms& terms) {
   return session.ReadAs<EntitiesAnswer>([&](const SessionView& view) {
-    return GatherEntities(view.mesh, kind, selection, session.limits().max_query_bytes);
+    return GatherEntities(view.mesh, kind, selection, QueryBudget(session.limits(), terms));
   });
 }
 
-absl::StatusOr<BoundaryAnswer> QueryBoundary(const Session& session, EntityKind kind) {
+absl::StatusOr<BoundaryAnswer> QueryBoundary(const Session& session, EntityKind kind,
+                                             const QueryTerms& terms) {
   if (kind == EntityKind::kCell) {
     return InvalidArgument(reason::kBadEntityKind, "cells are never on the boundary", {{"kind", "cell"}});
   }
   return session.ReadAs<BoundaryAnswer>([&](const SessionView& view) {
-    return GatherBoundary(view.mesh, kind, session.limits().max_query_bytes);
+    return GatherBoundary(view.mesh, kind, QueryBudget(session.limits(), terms));
   });
 }
 

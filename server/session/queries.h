@@ -6,13 +6,16 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "core/codec/surface_codec.h"
 #include "core/mesh/relations.h"
+#include "server/session/query_budget.h"
 #include "server/session/selection.h"
 #include "server/session/session.h"
 
 /// Reading a session. Each answer is gathered under one reader lock, so it speaks of one revision, into
-/// chunks of at most kChunkBytes; beyond the session's max_query_bytes it is refused with RESOURCE_EXHAUSTED.
-/// There is always a first chunk, even without rows.
+/// chunks of at most kChunkBytes. There is always a first chunk, even without rows.
+/// Errors of all: those of QueryBudget, so RESOURCE_EXHAUSTED beyond max_query_bytes of answer or
+/// max_query_steps of work, and whatever `terms.stop` says; those of Session::Read.
 namespace dynmesh {
 
 /// Rows of neighbours: row i has offsets[i + 1] - offsets[i] of them. A row longer than half a chunk is cut:
@@ -28,9 +31,9 @@ struct NeighborsAnswer {
 };
 
 /// Errors: NOT_FOUND ENTITY_REMOVED or UNKNOWN_ENTITY (metadata ids: the first that are not live);
-/// OUT_OF_RANGE REVISION_IN_FUTURE; RESOURCE_EXHAUSTED LIMIT_EXCEEDED (max_query_bytes).
+/// OUT_OF_RANGE REVISION_IN_FUTURE.
 absl::StatusOr<NeighborsAnswer> QueryNeighbors(const Session& session, Relation relation,
-                                               const Selection& selection);
+                                               const Selection& selection, const QueryTerms& terms = {});
 
 enum EntityFlags : uint8_t { kIsElement = 1, kIsOnBoundary = 2, kIsDuplicate = 4 };
 
@@ -50,25 +53,26 @@ struct EntitiesAnswer {
 
 /// Errors: as QueryNeighbors.
 absl::StatusOr<EntitiesAnswer> QueryEntities(const Session& session, EntityKind kind,
-                                             const Selection& selection);
+                                             const Selection& selection, const QueryTerms& terms = {});
 
 struct BoundaryAnswer {
   int64_t revision = 0;
   std::vector<Slot> ids;  ///< ascending
 };
 
-/// Errors: INVALID_ARGUMENT BAD_ENTITY_KIND for cells; RESOURCE_EXHAUSTED LIMIT_EXCEEDED.
-absl::StatusOr<BoundaryAnswer> QueryBoundary(const Session& session, EntityKind kind);
+/// Errors: INVALID_ARGUMENT BAD_ENTITY_KIND for cells.
+absl::StatusOr<BoundaryAnswer> QueryBoundary(const Session& session, EntityKind kind,
+                                             const QueryTerms& terms = {});
 
+/// The boundary as triangles, not yet encoded: EncodeSurface() needs no session.
 struct SurfaceAnswer {
   int64_t revision = 0;
-  std::string drc;  ///< a whole file
+  TriangleSurface surface;
 };
 
-/// Faces with exactly one cell and faces that are elements, encoded without the lock. Quads are cut along the
-/// diagonal of their first vertex. REQUIRES: 1 <= position_bits <= 30.
-/// Errors: FAILED_PRECONDITION when there is no surface; RESOURCE_EXHAUSTED LIMIT_EXCEEDED.
-absl::StatusOr<SurfaceAnswer> QuerySurface(const Session& session, int position_bits);
+/// Faces with exactly one cell and faces that are elements. Quads are cut along the diagonal of their first
+/// vertex.
+absl::StatusOr<SurfaceAnswer> QuerySurface(const Session& session, const QueryTerms& terms = {});
 
 }  // namespace dynmesh
 

@@ -73,6 +73,10 @@ std::vector<SessionPtr> SessionRegistry::ListAfter(absl::string_view after, size
 
 absl::StatusOr<int64_t> SessionRegistry::Delete(absl::string_view name, absl::string_view etag) {
   DYNMESH_ASSIGN_OR_RETURN(const SessionPtr session, Find(name));
+  return Delete(session, etag);
+}
+
+absl::StatusOr<int64_t> SessionRegistry::Delete(const SessionPtr& session, absl::string_view etag) {
   DYNMESH_ASSIGN_OR_RETURN(const int64_t revision, session->Delete(etag));
   MutexLock lock(&mu_);
   sessions_.erase(session->name());

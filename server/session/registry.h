@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -11,6 +12,7 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 #include "server/session/answer_memory.h"
+#include "server/session/budget.h"
 #include "server/session/importer/importer.h"
 #include "server/session/limits.h"
 #include "server/session/mutex.h"
@@ -25,7 +27,10 @@ namespace dynmesh {
 class SessionRegistry {
  public:
   SessionRegistry(const Limits& limits, const Workers& workers)
-      : limits_(limits), workers_(workers), import_gate_(limits.max_concurrent_imports) {}
+      : limits_(limits),
+        workers_(workers),
+        import_gate_(limits),
+        answer_budget_(std::make_shared<Budget>("max_answer_bytes", limits.max_answer_bytes)) {}
 
   /// Makes an empty session. The same request_id with the same name and settings: what the first call gave.
   /// Errors: INVALID_ARGUMENT BAD_SESSION_NAME, REQUEST_ID_REUSED; ALREADY_EXISTS SESSION_EXISTS;
@@ -42,11 +47,15 @@ class SessionRegistry {
   /// Deletes a session and ends what follows it; returns its last revision.
   /// Errors: NOT_FOUND SESSION_NOT_FOUND; ABORTED ETAG_MISMATCH.
   absl::StatusOr<int64_t> Delete(absl::string_view name, absl::string_view etag);
+  /// The same for a session that was found. Errors: NOT_FOUND SESSION_DELETED; ABORTED ETAG_MISMATCH.
+  absl::StatusOr<int64_t> Delete(const SessionPtr& session, absl::string_view etag);
 
   /// Ends all subscriptions with UNAVAILABLE SHUTTING_DOWN, and refuses new ones and new sessions.
   void Drain();
 
   ImportGate& import_gate() { return import_gate_; }
+  /// Of answers that are gathered and wait to be read (max_answer_bytes).
+  const std::shared_ptr<Budget>& answer_budget() const { return answer_budget_; }
   const Limits& limits() const { return limits_; }
   const Workers& workers() const { return workers_; }
 
@@ -57,6 +66,7 @@ class SessionRegistry {
   const Limits limits_;
   const Workers workers_;
   ImportGate import_gate_;
+  const std::shared_ptr<Budget> answer_budget_;
   mutable Mutex mu_;
   std::map<std::string, SessionPtr, std::less<>> sessions_ ABSL_GUARDED_BY(mu_);
   AnswerMemory<SessionInfo> created_ ABSL_GUARDED_BY(mu_);

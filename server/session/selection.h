@@ -32,22 +32,6 @@ absl::Status ForEachSelected(const Mesh& mesh, EntityKind kind, const Selection&
 /// Arrays of one message hold at most about this much.
 inline constexpr size_t kChunkBytes = size_t{1} << 20;
 
-/// How much of max_query_bytes an answer has used while it is gathered.
-class QueryBudget {
- public:
-  explicit QueryBudget(uint64_t max_bytes) : max_bytes_(max_bytes) {}
-
-  /// Errors: RESOURCE_EXHAUSTED LIMIT_EXCEEDED (max_query_bytes).
-  absl::Status Charge(uint64_t bytes) {
-    bytes_ += bytes;
-    return bytes_ <= max_bytes_ ? absl::OkStatus() : LimitExceeded("max_query_bytes", max_bytes_, bytes_);
-  }
-
- private:
-  const uint64_t max_bytes_;
-  uint64_t bytes_ = 0;
-};
-
 }  // namespace dynmesh
 
 #endif  // DYNMESH_SERVER_SESSION_SELECTION_H_

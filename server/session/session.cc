@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <map>
 #include <random>
 #include <utility>
 #include <variant>
@@ -21,10 +22,11 @@ namespace {
 constexpr size_t kMaxNameBytes = 64;
 // A mesh is measured after so many new items, not for each batch.
 constexpr uint64_t kItemsBetweenChecks = 1000;
+constexpr uint64_t kBytesBetweenChecks = 64 << 10;
 
-uint64_t RandomId() {
+std::string RandomUid() {
   std::random_device device;
-  return uint64_t{device()} << 32 | device();
+  return absl::StrCat(absl::Hex(uint64_t{device()} << 32 | device(), absl::kZeroPad16));
 }
 
 uint64_t FingerprintOf(absl::Span<const Edit> edits, const ApplyOptions& options) {
@@ -45,6 +47,33 @@ size_t BytesOf(const BatchResult& result) {
 bool Grows(const Edit& edit) {
   return std::holds_alternative<AddVerticesEdit>(edit) || std::holds_alternative<AddElementsEdit>(edit) ||
          std::holds_alternative<AddAttributeEdit>(edit) || std::holds_alternative<SetAttributeEdit>(edit);
+}
+
+/// Bytes that the rows which `edits` set would add. A row at a far slot takes a page, so that is much more than
+/// what arrives.
+uint64_t AttributeGrowth(const Mesh& mesh, absl::Span<const Edit> edits) {
+  struct Rows {
+    const AttributeSpec* spec = nullptr;
+    std::vector<Slot> slots;
+  };
+  std::map<std::pair<EntityKind, std::string>, Rows> columns;
+  for (const Edit& edit : edits) {
+    const auto* set = std::get_if<SetAttributeEdit>(&edit);
+    if (set == nullptr) continue;
+    Rows& rows = columns[{set->spec.kind, set->spec.name}];
+    rows.spec = &set->spec;
+    const Slot limit = mesh.slots(set->spec.kind).limit();
+    for (Slot slot : set->slots) {
+      if (slot < limit) rows.slots.push_back(slot);  // others are refused
+    }
+  }
+  uint64_t bytes = 0;
+  for (const auto& [key, rows] : columns) {
+    const int index = mesh.FindAttribute(key.second, key.first);
+    const AttributeColumn fresh(*rows.spec);
+    bytes += (index < 0 ? fresh : mesh.attributes()[index]).BytesToSet(rows.slots);
+  }
+  return bytes;
 }
 
 absl::Status CheckBatchSize(absl::Span<const Edit> edits, const Limits& limits) {
@@ -76,7 +105,7 @@ absl::Status CheckSessionName(absl::string_view name) {
 
 Session::Session(const Options& options)
     : options_(options),
-      creation_id_(RandomId()),
+      uid_(RandomUid()),
       create_time_(absl::Now()),
       mesh_(MeshOptions{options.settings.duplicates, ToMeshLimits(options.limits)}),
       commit_time_(create_time_),
@@ -98,6 +127,7 @@ absl::StatusOr<SessionInfo> Session::Info() const {
 SessionInfo Session::Describe(const Mesh& mesh, const MeshSummary& summary, absl::Time update_time) const {
   SessionInfo info = DescribeMesh(mesh, summary);
   info.name = name();
+  info.uid = uid();
   info.settings = settings();
   info.etag = EtagAt(info.revision);
   info.create_time = create_time_;
@@ -166,8 +196,9 @@ absl::Status Session::CheckRevisions(const ApplyOptions& options) const {
 absl::Status Session::CheckMemory(absl::Span<const Edit> edits) {
   if (std::none_of(edits.begin(), edits.end(), Grows)) return absl::OkStatus();
   for (const Edit& edit : edits) items_since_check_ += NumItems(edit);
-  if (items_since_check_ < kItemsBetweenChecks) return absl::OkStatus();
-  const uint64_t bytes = mesh_.memory_bytes();
+  const uint64_t growth = AttributeGrowth(mesh_, edits);
+  if (items_since_check_ < kItemsBetweenChecks && growth < kBytesBetweenChecks) return absl::OkStatus();
+  const uint64_t bytes = mesh_.memory_bytes() + growth;
   if (bytes > limits().max_session_bytes) {
     return LimitExceeded("max_session_bytes", limits().max_session_bytes, bytes);
   }
@@ -186,22 +217,19 @@ Session::AnswerPtr Session::Unchanged() const {
 void Session::Committed() {
   commit_time_ = absl::Now();
   revision_.store(mesh_.revision());
+  for (EntityKind kind : kEntityKinds) num_live_[Dimension(kind)].store(mesh_.NumLive(kind));
 }
 
 absl::Status Session::CheckEmpty() const {
-  ReaderMutexLock lock(&mu_);
-  return CheckEmptyLocked();
-}
-
-absl::Status Session::CheckEmptyLocked() const {
-  DYNMESH_RETURN_IF_ERROR(gone_);
-  return mesh_.revision() == 0 ? absl::OkStatus() : SessionNotEmpty(name(), mesh_.revision());
+  return revision() == 0 ? absl::OkStatus() : SessionNotEmpty(name(), revision());
 }
 
 absl::Status Session::Adopt(Mesh& mesh) {
   {
+    DYNMESH_RETURN_IF_ERROR(CheckEmpty());  // else the lock may be busy for long
     WriterMutexLock lock(&mu_);
-    DYNMESH_RETURN_IF_ERROR(CheckEmptyLocked());
+    DYNMESH_RETURN_IF_ERROR(gone_);
+    DYNMESH_RETURN_IF_ERROR(CheckEmpty());
     std::swap(mesh_, mesh);
     Committed();
   }
@@ -211,14 +239,13 @@ absl::Status Session::Adopt(Mesh& mesh) {
 
 absl::StatusOr<std::shared_ptr<const ImportOutcome>> Session::FindImport(absl::string_view request_id,
                                                                          uint64_t fingerprint) const {
-  ReaderMutexLock lock(&mu_);
-  DYNMESH_RETURN_IF_ERROR(gone_);
+  MutexLock lock(&imports_mu_);
   return imports_.Find(request_id, fingerprint);
 }
 
 void Session::RememberImport(const std::string& request_id, uint64_t fingerprint,
                              std::shared_ptr<const ImportOutcome> outcome) {
-  WriterMutexLock lock(&mu_);
+  MutexLock lock(&imports_mu_);
   imports_.Remember(request_id, fingerprint, std::move(outcome), 0);
 }
 
@@ -235,7 +262,7 @@ absl::StatusOr<int64_t> Session::Delete(absl::string_view etag) {
 }
 
 std::string Session::EtagAt(int64_t revision) const {
-  return absl::StrCat(absl::Hex(creation_id_, absl::kZeroPad16), "-", revision);
+  return absl::StrCat(uid_, "-", revision);
 }
 
 }  // namespace dynmesh

@@ -1,6 +1,7 @@
 #ifndef DYNMESH_SERVER_SESSION_SESSION_H_
 #define DYNMESH_SERVER_SESSION_SESSION_H_
 
+#include <array>
 #include <atomic>
 #include <cstdint>
 #include <memory>
@@ -16,6 +17,7 @@
 #include "absl/types/span.h"
 #include "core/edit/transaction.h"
 #include "core/mesh/mesh.h"
+#include "server/session/access_queue.h"
 #include "server/session/answer_memory.h"
 #include "server/session/delta_source.h"
 #include "server/session/follower_list.h"
@@ -49,15 +51,18 @@ absl::Status CheckSessionName(absl::string_view name);
 
 /// A named mesh with its revision, its lock and its followers.
 ///
-///     Session ── mu_ (reader/writer) ── Mesh, commit time, answers to request ids
+///     Session ── AccessQueue ── calls that wait for their turn
+///        ├────── mu_ (reader/writer) ── Mesh, commit time, answers to request ids
 ///        ├────── FollowerList ── Follower ── DeltaSink (an RPC stream)
 ///        └────── DeltaSource ── encoded payloads shared by followers, quantisation grids
 ///
 /// Edits take the writer lock for as long as they compute; reads share the reader lock. Neither is held over
 /// network or encoding. Followers are woken after each commit, when the lock is free again.
+/// Read(), Apply() and what else takes the lock may wait for it. So threads that others share ask access() for
+/// their turn first, and then do not wait; what is marked "Never waits" needs no turn.
 /// Once deleted, every call fails with NOT_FOUND SESSION_DELETED.
 /// Thread safety: full. Always owned by a shared_ptr.
-class Session {
+class Session : public std::enable_shared_from_this<Session> {
  public:
   struct Options {
     std::string name;
@@ -74,8 +79,15 @@ class Session {
   const SessionSettings& settings() const { return options_.settings; }
   const Limits& limits() const { return options_.limits; }
   const Workers& workers() const { return options_.workers; }
+  /// Tells this session from an earlier or later one of the same name: 16 hexadecimal digits.
+  const std::string& uid() const { return uid_; }
   /// Of the last commit. Never waits.
   int64_t revision() const { return revision_.load(); }
+  /// Live entities of a kind at about the last commit. Never waits.
+  uint32_t num_live(EntityKind kind) const { return num_live_[Dimension(kind)].load(); }
+
+  /// Where calls wait for their turn to read or write this.
+  AccessQueue& access() { return *access_; }
 
   /// Calls fn under the reader lock and returns what it returns.
   absl::Status Read(absl::FunctionRef<absl::Status(const SessionView&)> fn) const ABSL_LOCKS_EXCLUDED(mu_);
@@ -105,19 +117,19 @@ class Session {
       ABSL_LOCKS_EXCLUDED(mu_);
 
   /// What the import `request_id` gave, nullptr if there was none. Errors: INVALID_ARGUMENT
-  /// REQUEST_ID_REUSED.
+  /// REQUEST_ID_REUSED. Never waits.
   absl::StatusOr<std::shared_ptr<const ImportOutcome>> FindImport(absl::string_view request_id,
                                                                   uint64_t fingerprint) const
-      ABSL_LOCKS_EXCLUDED(mu_);
+      ABSL_LOCKS_EXCLUDED(imports_mu_);
 
-  /// FAILED_PRECONDITION SESSION_NOT_EMPTY unless the session is at revision 0.
-  absl::Status CheckEmpty() const ABSL_LOCKS_EXCLUDED(mu_);
+  /// FAILED_PRECONDITION SESSION_NOT_EMPTY unless the session is at revision 0. Never waits.
+  absl::Status CheckEmpty() const;
 
   /// Makes `mesh`, which is at revision 1, the content. Errors: as CheckEmpty; `mesh` is untouched then.
   absl::Status Adopt(Mesh& mesh) ABSL_LOCKS_EXCLUDED(mu_);
 
   void RememberImport(const std::string& request_id, uint64_t fingerprint,
-                      std::shared_ptr<const ImportOutcome> outcome) ABSL_LOCKS_EXCLUDED(mu_);
+                      std::shared_ptr<const ImportOutcome> outcome) ABSL_LOCKS_EXCLUDED(imports_mu_);
 
   /// Ends the session and its followers; returns its last revision. An empty `etag` fits any.
   /// Errors: ABORTED ETAG_MISMATCH; NOT_FOUND SESSION_DELETED.
@@ -135,14 +147,14 @@ class Session {
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
   absl::StatusOr<AnswerPtr> ApplyOnce(absl::Span<const Edit> edits, const ApplyOptions& options,
                                       uint64_t fingerprint) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
-  absl::Status CheckEmptyLocked() const ABSL_SHARED_LOCKS_REQUIRED(mu_);
   absl::Status CheckMemory(absl::Span<const Edit> edits) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
   AnswerPtr Unchanged() const ABSL_SHARED_LOCKS_REQUIRED(mu_);
   void Committed() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
 
   const Options options_;
-  const uint64_t creation_id_;  ///< tells this session from an earlier one of the same name
+  const std::string uid_;
   const absl::Time create_time_;
+  const std::shared_ptr<AccessQueue> access_ = std::make_shared<AccessQueue>();
 
   mutable SharedMutex mu_;
   Mesh mesh_ ABSL_GUARDED_BY(mu_);
@@ -150,8 +162,11 @@ class Session {
   absl::Status gone_ ABSL_GUARDED_BY(mu_);  ///< not OK: deleted, or damaged by a failure half way
   uint64_t items_since_check_ ABSL_GUARDED_BY(mu_) = 0;
   AnswerMemory<BatchResult> answers_ ABSL_GUARDED_BY(mu_);
-  AnswerMemory<ImportOutcome> imports_ ABSL_GUARDED_BY(mu_);
   std::atomic<int64_t> revision_{0};
+  std::array<std::atomic<uint32_t>, kNumEntityKinds> num_live_ = {};
+
+  mutable Mutex imports_mu_;
+  AnswerMemory<ImportOutcome> imports_ ABSL_GUARDED_BY(imports_mu_);
 
   mutable SummaryCache summary_;
   FollowerList followers_;

@@ -18,6 +18,8 @@ absl::Status ShuttingDown() {
 
 absl::Status CallCancelled() { return absl::CancelledError("the call was cancelled"); }
 
+absl::Status DeadlinePassed() { return absl::DeadlineExceededError("the call's deadline passed"); }
+
 absl::Status RevisionInFuture(int64_t requested, int64_t actual) {
   return MakeError(absl::StatusCode::kOutOfRange, reason::kRevisionInFuture,
                    absl::StrCat("revision ", requested, " is in the future: the session is at ", actual),
@@ -38,6 +40,20 @@ absl::Status SessionNotFound(absl::string_view name) {
 absl::Status SessionDeleted(absl::string_view name) {
   return MakeError(absl::StatusCode::kNotFound, reason::kSessionDeleted,
                    absl::StrCat("session ", name, " has been deleted"), {{"session", std::string(name)}});
+}
+
+absl::Status SessionRecreated(absl::string_view name, absl::string_view expected, absl::string_view actual) {
+  return MakeError(absl::StatusCode::kAborted, reason::kSessionRecreated,
+                   absl::StrCat("session ", name, " was deleted, and another one has its name"),
+                   {{"session", std::string(name)},
+                    {"expected", std::string(expected)},
+                    {"actual", std::string(actual)}});
+}
+
+absl::Status ImportIdle(absl::Duration timeout) {
+  return MakeError(absl::StatusCode::kDeadlineExceeded, reason::kImportIdle,
+                   absl::StrCat("nothing of the import arrived for ", absl::FormatDuration(timeout)),
+                   {{"limit", "import_idle_timeout"}});
 }
 
 absl::Status SessionDamaged(absl::string_view name) {

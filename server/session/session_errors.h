@@ -5,6 +5,7 @@
 
 #include "absl/status/status.h"
 #include "absl/strings/string_view.h"
+#include "absl/time/time.h"
 
 /// The errors of sessions, each made in one place (reasons: core/mesh/error.h).
 namespace dynmesh {
@@ -15,8 +16,11 @@ absl::Status OutOfMemory();
 /// UNAVAILABLE SHUTTING_DOWN.
 absl::Status ShuttingDown();
 
-/// CANCELLED: the peer went away or its deadline passed.
+/// CANCELLED: the peer went away, or the server has no more time for the call.
 absl::Status CallCancelled();
+
+/// DEADLINE_EXCEEDED: the call's deadline passed.
+absl::Status DeadlinePassed();
 
 /// OUT_OF_RANGE REVISION_IN_FUTURE, metadata requested and actual.
 absl::Status RevisionInFuture(int64_t requested, int64_t actual);
@@ -29,6 +33,12 @@ absl::Status SessionNotFound(absl::string_view name);
 
 /// NOT_FOUND SESSION_DELETED.
 absl::Status SessionDeleted(absl::string_view name);
+
+/// ABORTED SESSION_RECREATED, metadata expected and actual: the session of that name is not the one that is meant.
+absl::Status SessionRecreated(absl::string_view name, absl::string_view expected, absl::string_view actual);
+
+/// DEADLINE_EXCEEDED IMPORT_IDLE, metadata limit.
+absl::Status ImportIdle(absl::Duration timeout);
 
 /// DATA_LOSS INTERNAL: an edit ended half way, so what the session holds is not to be trusted.
 absl::Status SessionDamaged(absl::string_view name);

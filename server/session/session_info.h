@@ -35,6 +35,7 @@ struct SessionSettings {
 /// What a session is and holds at one revision.
 struct SessionInfo {
   std::string name;
+  std::string uid;
   int64_t revision = 0;
   std::string etag;
   SessionSettings settings;

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "core/codec/surface_codec.h"
 #include "server/session/queries.h"
 
 namespace dynmesh {
@@ -41,24 +40,24 @@ absl::Status GatherSurface(const Mesh& mesh, QueryBudget budget, TriangleSurface
   const BitSet& live = mesh.slots(EntityKind::kFace).live();
   for (Slot slot = live.Next(0); slot != kNoSlot; slot = live.Next(slot + 1)) {
     const FaceId f(slot);
+    DYNMESH_RETURN_IF_ERROR(budget.ChargeSteps(1));
     if (!IsOnSurface(mesh, f)) continue;
-    DYNMESH_RETURN_IF_ERROR(budget.Charge(2 * kTriangleBytes));
+    DYNMESH_RETURN_IF_ERROR(budget.ChargeBytes(2 * kTriangleBytes));
     AppendTriangles(mesh.Vertices(f), surface.triangles);
   }
+  DYNMESH_RETURN_IF_ERROR(budget.ChargeSteps(3 * surface.triangles.size()));
   MakeVertexTable(mesh, surface);
   return absl::OkStatus();
 }
 
 }  // namespace
 
-absl::StatusOr<SurfaceAnswer> QuerySurface(const Session& session, int position_bits) {
+absl::StatusOr<SurfaceAnswer> QuerySurface(const Session& session, const QueryTerms& terms) {
   SurfaceAnswer answer;
-  TriangleSurface surface;
   DYNMESH_RETURN_IF_ERROR(session.Read([&](const SessionView& view) {
     answer.revision = view.mesh.revision();
-    return GatherSurface(view.mesh, QueryBudget(session.limits().max_query_bytes), surface);
+    return GatherSurface(view.mesh, QueryBudget(session.limits(), terms), answer.surface);
   }));
-  DYNMESH_ASSIGN_OR_RETURN(answer.drc, EncodeSurface(surface, position_bits));
   return answer;
 }
 

@@ -115,3 +115,27 @@ def test_handles_without_a_vertex_are_refused(session):
             handles = tx.add_vertices(TET)
             tx.add_elements("tetra", [np.append(handles[:3], handles[3] + 1)])
     assert session.revision == 0
+
+
+@pytest.mark.parametrize("revision", [2**70, -(2**63) - 1, 1.5, "1", None])
+def test_a_revision_that_is_no_64_bit_integer_is_refused(session, revision):
+    session.import_mesh(TET, {})
+    uses = [
+        lambda: session.positions([0], as_of_revision=revision),
+        lambda: session.neighbors("vertex", "cell", [0], as_of_revision=revision),
+        lambda: session.apply(EditBatch(), as_of_revision=revision),
+        lambda: session.edit_stream(as_of_revision=revision),
+    ]
+    if revision is not None:
+        uses.append(lambda: session.apply(EditBatch(), if_revision=revision))
+    for use in uses:
+        with pytest.raises(dynmesh.InvalidArgumentError, match="BAD_ARGUMENT"):
+            use()
+
+
+@pytest.mark.parametrize("options", [{"min_interval": x} for x in (float("nan"), float("inf"), -1.0, 1e9)])
+def test_an_interval_that_is_none_is_refused(session, options):
+    with pytest.raises(dynmesh.InvalidArgumentError, match="min_interval"):
+        session.mirror(**options)
+    with pytest.raises(dynmesh.InvalidArgumentError, match="position_bits"):
+        session.mirror(position_bits=2**40)

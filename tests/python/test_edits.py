@@ -42,6 +42,31 @@ def test_ids_beside_handles_stay_as_they_are(session):
     assert tx.result.resolve([[0, 1, new[0]]]).tolist() == [[0, 1, 4]]
 
 
+def test_a_handle_of_another_batch_is_refused(session):
+    with session.edit() as tx:
+        old = tx.add_vertices(TET)
+        tx.add_elements("tetra", [old])
+    for use in (
+        lambda batch: batch.add_elements("tetra", [old]),
+        lambda batch: batch.add_elements("line", [[0, old[3]]]),
+        lambda batch: batch.move_vertices(old[:1], [[0, 0, 0]]),
+        lambda batch: batch.remove_vertices(old),
+        lambda batch: batch.set_attribute("t", "vertex", old[:1], [1.0]),
+    ):
+        batch = EditBatch()
+        batch.add_vertices(TET)
+        with pytest.raises(dynmesh.InvalidArgumentError, match="FOREIGN_HANDLE"):
+            use(batch)
+    with session.edit() as other:
+        other.add_vertices(TET)
+    with pytest.raises(dynmesh.InvalidArgumentError, match="FOREIGN_HANDLE") as caught:
+        other.result.resolve([[1, 2], [3, old[0]]])
+    assert caught.value.metadata == {"index": "3"}
+    with pytest.raises(dynmesh.InvalidArgumentError):
+        session.positions(old)
+    assert tx.result.resolve(old).tolist() == [0, 1, 2, 3]
+
+
 def test_an_exception_in_the_block_sends_nothing(session):
     with pytest.raises(ZeroDivisionError):
         with session.edit() as tx:
@@ -98,6 +123,28 @@ def test_a_batch_beyond_the_limit_is_refused_by_the_name_of_the_limit(session):
             tx.add_vertices(np.zeros((200_000, 3)))
     assert caught.value.reason == "LIMIT_EXCEEDED" and caught.value.metadata["limit"] == "max_message_bytes"
     assert session.revision == 0
+
+
+def test_what_grpc_would_refuse_is_not_sent(daemon, session):
+    batch = EditBatch()
+    batch.add_vertices(np.zeros((750_000, 3)))  # 18 MB; up to 16 MiB the server says it by itself
+
+    def check(call):
+        with pytest.raises(dynmesh.ResourceExhaustedError, match="LIMIT_EXCEEDED") as caught:
+            call()
+        assert caught.value.metadata["limit"] == "max_message_bytes"
+        assert int(caught.value.metadata["requested"]) > 18_000_000
+
+    check(lambda: session.apply(batch))
+    with session.edit_stream() as stream:
+        good = stream.submit(tet_batch())
+        check(lambda: stream.submit(batch))
+        assert stream.submit(tet_batch(1.0)).result().revision == 2  # the stream goes on
+    assert good.result().revision == 1
+    with daemon.connect(max_message_bytes=1000) as client:
+        with pytest.raises(dynmesh.ResourceExhaustedError, match="max_message_bytes"):
+            client.session(session.name).import_mesh(np.zeros((400, 3)), {})
+    assert session.revision == 2
 
 
 def test_if_revision_refuses_when_somebody_was_faster(session):

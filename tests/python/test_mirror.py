@@ -173,6 +173,47 @@ def test_a_session_made_anew_under_its_name_is_followed_from_its_beginning(clien
     session.delete()
 
 
+def test_a_namesake_that_has_come_as_far_is_not_taken_for_the_old_session(client):
+    session = client.create_session("phoenix")
+    with session.edit() as tx:
+        tx.add_vertices([[0, 0, 0], [1, 0, 0]])
+        tx.add_attribute("t", "vertex")
+    with session.edit() as tx:
+        tx.set_attribute("t", "vertex", [0], [7.0])
+    with session.mirror() as old:
+        old.wait(2, timeout=WAIT_S)
+    uid = session.info().uid
+    session.delete()
+    session = client.create_session("phoenix")
+    assert session.info().uid != uid
+    with session.edit() as tx:  # the same vertices, so the same checksum: only the attribute differs
+        tx.add_vertices([[0, 0, 0], [1, 0, 0]])
+        tx.add_attribute("t", "vertex")
+    revision = move(session, [0], [[0, 0, 0]])
+    with session.mirror(from_mirror=old) as mirror:
+        mirror.wait(revision, timeout=WAIT_S)
+        assert_equal(mirror, session)
+        assert mirror.stats.refollows == 1
+        assert not mirror.attribute("t", "vertex").any()
+    session.delete()
+
+
+def test_one_that_reads_slowly_is_sent_fewer_larger_deltas(daemon, session):
+    session.import_mesh(grid_tets(12), progress=False)
+    read_on = threading.Event()
+    with daemon.connect(read_ahead_bytes=64 << 10) as client:
+        with client.session(session.name).mirror(codec="raw", on_delta=lambda _: read_on.wait(WAIT_S)) as mirror:
+            mirror.wait(1, timeout=WAIT_S)
+            for _ in range(40):
+                revision = move(session, np.arange(13**3))  # 60 KB each
+            read_on.set()
+            mirror.wait(revision, timeout=WAIT_S)
+            assert_equal(mirror, session)
+            assert mirror.stats.deltas < 10
+    with pytest.raises(dynmesh.InvalidArgumentError):
+        daemon.connect(read_ahead_bytes=1000)
+
+
 def test_deleting_the_session_ends_it(client):
     session = client.create_session("short")
     with session.mirror() as mirror:

@@ -1,11 +1,14 @@
 // The binary itself: flags, environment, ready file, signals, exit codes.
 
 #include <fcntl.h>
+#include <grpcpp/create_channel.h>
+#include <grpcpp/security/credentials.h>
 #include <signal.h>
 #include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
@@ -112,6 +115,106 @@ TEST_F(DynmeshdTest, ServesUntilSigtermAndExitsWith0) {
   }
 }
 
+/// A call that is under way when the daemon is told to end.
+class CallUnderWay {
+ public:
+  template <typename Fn>
+  explicit CallUnderWay(Fn fn) : thread_([this, fn] { fn(&context_); }) {}
+  ~CallUnderWay() {
+    context_.TryCancel();
+    thread_.join();
+  }
+
+ private:
+  PatientContext context_;
+  std::thread thread_;
+};
+
+TEST_F(DynmeshdTest, EndsInTimeWhateverItDoes) {
+  Process process({"--listen=127.0.0.1:0", "--ready_file=" + ready_file_, "--drain_timeout=1s",
+                   "--max_query_steps=1000000000000000000"},
+                  {});
+  const auto addresses = AwaitReady();
+  ASSERT_EQ(addresses.size(), 1u);
+  const auto channel = grpc::CreateChannel(addresses[0], grpc::InsecureChannelCredentials());
+  const auto sessions = v1::SessionService::NewStub(channel);
+  const auto edits = v1::EditService::NewStub(channel);
+  const auto queries = v1::QueryService::NewStub(channel);
+  const auto subscriptions = v1::SubscriptionService::NewStub(channel);
+  for (const char* name : {"book", "empty"}) {
+    PatientContext context;
+    v1::CreateSessionRequest request;
+    request.set_name(name);
+    v1::CreateSessionResponse response;
+    ASSERT_TRUE(sessions->CreateSession(&context, request, &response).ok());
+  }
+  {
+    PatientContext context;
+    v1::ApplyEditsResponse response;
+    ASSERT_TRUE(edits->ApplyEdits(&context, BookBatch("book", 50'000), &response).ok());
+  }
+  std::atomic<int> begun{0};
+  const CallUnderWay query([&](grpc::ClientContext* context) {
+    // All of its edges, of which the hub is one.
+    v1::GetNeighborsRequest request = CellsOfEdges("book", 0, 0);
+    std::vector<Slot> edges;
+    for (int i = 0; i < 900'000; ++i) edges.push_back(i % 3);
+    *request.mutable_selection() = SelectIds(edges);
+    const auto stream = queries->GetNeighbors(context, request);
+    ++begun;
+    v1::GetNeighborsResponse response;
+    while (stream->Read(&response)) {
+    }
+    EXPECT_FALSE(stream->Finish().ok());
+  });
+  const CallUnderWay validate([&](grpc::ClientContext*) {
+    v1::ValidateSessionRequest request;
+    request.set_session("book");
+    v1::ValidateSessionResponse response;
+    ++begun;
+    for (bool serves = true; serves;) {  // one after the other, so that one is under way
+      PatientContext context;
+      serves = sessions->ValidateSession(&context, request, &response).ok();
+    }
+  });
+  const CallUnderWay import([&](grpc::ClientContext* context) {
+    const auto stream = sessions->ImportMesh(context);
+    stream->Write(ImportHead("empty"));
+    stream->Write(ImportPositions(SomePoints(1000)));
+    ++begun;
+    v1::ImportMeshResponse response;
+    while (stream->Read(&response)) {
+    }
+    EXPECT_FALSE(stream->Finish().ok());
+  });
+  const CallUnderWay edit([&](grpc::ClientContext* context) {
+    const auto stream = edits->StreamEdits(context);
+    v1::StreamEditsRequest request;
+    *request.mutable_batch() = TetBatch("book");  // waits for the query
+    stream->Write(request);
+    ++begun;
+    v1::StreamEditsResponse response;
+    while (stream->Read(&response)) {
+    }
+    EXPECT_FALSE(stream->Finish().ok());
+  });
+  const CallUnderWay follow([&](grpc::ClientContext* context) {
+    v1::SubscribeRequest request;
+    request.set_session("book");
+    const auto stream = subscriptions->Subscribe(context, request);
+    ++begun;
+    v1::SubscribeResponse response;
+    while (stream->Read(&response)) {
+    }
+    EXPECT_FALSE(stream->Finish().ok());
+  });
+  while (begun < 5) std::this_thread::yield();
+  const absl::Time begin = absl::Now();
+  process.Signal(SIGTERM);
+  EXPECT_EQ(process.Wait(), 0) << process.output();
+  EXPECT_LT(absl::Now() - begin, absl::Seconds(6));
+}
+
 TEST_F(DynmeshdTest, TheEnvironmentStandsInForFlags) {
   const std::string socket = ::testing::TempDir() + "dynmeshd-" + std::to_string(getpid()) + ".sock";
   Process process({"--ready_file=" + ready_file_, "--listen="},
@@ -123,6 +226,26 @@ TEST_F(DynmeshdTest, TheEnvironmentStandsInForFlags) {
   EXPECT_EQ(AwaitReady().size(), 2u);
   other.Signal(SIGTERM);
   EXPECT_EQ(other.Wait(), 0);
+}
+
+TEST_F(DynmeshdTest, TheHealthCheckFollowsTheFlagsAndTheEnvironment) {
+  EXPECT_EQ(ProbeTarget({"0.0.0.0:7447"}, ""), "127.0.0.1:7447");
+  EXPECT_EQ(ProbeTarget({"", "[::]:1", "127.0.0.1:2"}, "/s"), "[::1]:1");
+  EXPECT_EQ(ProbeTarget({"10.1.2.3:4"}, "/s"), "10.1.2.3:4");
+  EXPECT_EQ(ProbeTarget({"127.0.0.1:0"}, "/s"), "unix:/s");
+  EXPECT_EQ(ProbeTarget({}, ""), "");
+  const std::string socket = ::testing::TempDir() + "dynmeshd-" + std::to_string(getpid()) + ".sock";
+  const std::vector<std::string> environment = {"DYNMESHD_LISTEN=127.0.0.1:0", "DYNMESHD_UNIX_SOCKET=" + socket};
+  const std::vector<std::string> check = {"--health_check=self"};
+  Process process({"--ready_file=" + ready_file_}, environment);
+  const auto addresses = AwaitReady();
+  ASSERT_EQ(addresses.size(), 2u);
+  Run(0, check, environment);
+  Run(0, check, {"DYNMESHD_LISTEN=" + addresses[0]});
+  process.Signal(SIGTERM);
+  EXPECT_EQ(process.Wait(), 0);
+  Run(1, check, environment);
+  Run(1, check, {"DYNMESHD_LISTEN="});
 }
 
 TEST_F(DynmeshdTest, WrongCallsSayWhatIsWrong) {

@@ -312,6 +312,7 @@ TEST_F(EditsRpcTest, AStreamAnswersEachBatchInOrderAndRefusesInBand) {
     EXPECT_EQ(response.error().code(), grpc::NOT_FOUND);
     EXPECT_EQ(response.error().reason(), reason::kUnknownEntity);
     EXPECT_EQ(response.error().metadata().at("ids"), "99999");
+    EXPECT_EQ(response.error().revision(), revision);
     EXPECT_FALSE(response.error().message().empty());
   }
   EXPECT_FALSE(stream->Read(&response));
@@ -336,6 +337,31 @@ TEST_F(EditsRpcTest, AStreamServesSeveralSessionsAndEmptyMessages) {
   ASSERT_TRUE(stream->WritesDone());
   EXPECT_FALSE(stream->Read(&response));
   EXPECT_TRUE(stream->Finish().ok());
+}
+
+TEST_F(EditsRpcTest, WhatAStreamQueuesIsBoundedAndRefusedInBand) {
+  Limits limits;
+  limits.max_queued_bytes = 50'000;
+  StartServer(limits);
+  ASSERT_TRUE(CreateSession("mesh").ok());
+  v1::ApplyEditsRequest large = Batch("mesh");
+  *large.add_edits()->mutable_add_vertices() = AddVerticesMessage(SomePoints(3000));
+  PatientContext context;
+  const auto stream = edits().StreamEdits(&context);
+  v1::StreamEditsResponse response;
+  ASSERT_TRUE(stream->Write(Streamed(TetBatch("mesh"))));
+  ASSERT_TRUE(stream->Write(Streamed(large)));
+  ASSERT_TRUE(stream->Write(Streamed(TetBatch("mesh"))));
+  ASSERT_TRUE(stream->Read(&response));
+  EXPECT_EQ(response.applied().revision(), 1);
+  ASSERT_TRUE(stream->Read(&response));
+  EXPECT_EQ(response.error().code(), grpc::RESOURCE_EXHAUSTED);
+  EXPECT_EQ(response.error().metadata().at("limit"), "max_queued_bytes");
+  ASSERT_TRUE(stream->Read(&response));
+  EXPECT_EQ(response.applied().revision(), 2);
+  ASSERT_TRUE(stream->WritesDone());
+  EXPECT_TRUE(stream->Finish().ok());
+  ExpectError(Apply(large), grpc::RESOURCE_EXHAUSTED, reason::kLimitExceeded, "limit", "max_queued_bytes");
 }
 
 TEST_F(EditsRpcTest, AStreamWithoutBatchesEndsWell) {

@@ -1,6 +1,7 @@
 #include <cmath>
 #include <random>
 
+#include "absl/time/clock.h"
 #include "tests/server/server_support.h"
 #include "tests/support/meshes.h"
 
@@ -329,6 +330,69 @@ TEST_F(ImportRpcTest, ImportsAtOnceAreLimited) {
   ASSERT_TRUE(stream->Finish().ok());
   ASSERT_TRUE(CreateSession("next").ok());
   EXPECT_TRUE(ImportRequests({ImportHead("next")}).ok());
+}
+
+TEST_F(ImportRpcTest, IdleImportsMakeRoomForOthers) {
+  Limits limits;
+  limits.max_concurrent_imports = 2;
+  limits.import_idle_timeout = absl::Milliseconds(300);
+  StartServer(limits);
+  for (const char* name : {"mesh", "idle", "silent"}) ASSERT_TRUE(CreateSession(name).ok());
+  PatientContext idle_context, silent_context;
+  const auto idle = sessions().ImportMesh(&idle_context);
+  idle->Write(ImportHead("idle"));
+  idle->Write(ImportPositions(SomePoints(100'000)));
+  const auto silent = sessions().ImportMesh(&silent_context);
+  silent->Write(ImportHead("silent"));
+  v1::ImportMeshResponse response;
+  while (idle->Read(&response)) EXPECT_EQ(response.progress().revision(), 0);
+  ExpectError(idle->Finish(), grpc::DEADLINE_EXCEEDED, reason::kImportIdle, "limit", "import_idle_timeout");
+  while (silent->Read(&response)) {
+  }
+  ExpectError(silent->Finish(), grpc::DEADLINE_EXCEEDED, reason::kImportIdle);
+  EXPECT_TRUE(Import("mesh", TetGrid(3, 3, 3)).ok());
+  EXPECT_TRUE(Import("idle", TetGrid(2, 2, 2)).ok());
+}
+
+TEST_F(ImportRpcTest, AnImportMaySendWithPausesShorterThanTheTimeout) {
+  Limits limits;
+  limits.import_idle_timeout = absl::Milliseconds(400);
+  StartServer(limits);
+  ASSERT_TRUE(CreateSession("mesh").ok());
+  PatientContext context;
+  const auto stream = sessions().ImportMesh(&context);
+  stream->Write(ImportHead("mesh"));
+  const absl::Time end = absl::Now() + absl::Seconds(1);
+  while (absl::Now() < end) {
+    ASSERT_TRUE(stream->Write(ImportPositions(SomePoints(4))));
+    GetSession("mesh");  // some of the time passes
+  }
+  stream->WritesDone();
+  v1::ImportMeshResponse response;
+  while (stream->Read(&response)) {
+  }
+  EXPECT_TRUE(stream->Finish().ok());
+}
+
+TEST_F(ImportRpcTest, StagedBytesAreBoundedOverAllImports) {
+  Limits limits;
+  limits.max_staged_bytes = 3'000'000;
+  StartServer(limits);
+  for (const char* name : {"mesh", "other"}) ASSERT_TRUE(CreateSession(name).ok());
+  PatientContext context;
+  const auto stream = sessions().ImportMesh(&context);
+  stream->Write(ImportHead("other"));
+  stream->Write(ImportPositions(SomePoints(100'000)));
+  v1::ImportMeshResponse response;
+  ASSERT_TRUE(stream->Read(&response));
+  const std::vector<v1::ImportMeshRequest> second = {ImportHead("mesh"), ImportPositions(SomePoints(40'000))};
+  ExpectError(ImportRequests(second), grpc::RESOURCE_EXHAUSTED, reason::kLimitExceeded, "limit",
+              "max_staged_bytes");
+  stream->WritesDone();
+  while (stream->Read(&response)) {
+  }
+  EXPECT_TRUE(stream->Finish().ok());
+  EXPECT_TRUE(ImportRequests(second).ok());
 }
 
 TEST_F(ImportRpcTest, LargeMessagesAreRefusedByName) {

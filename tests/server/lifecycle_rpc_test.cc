@@ -5,6 +5,8 @@
 #include <grpcpp/security/credentials.h>
 #include <unistd.h>
 
+#include <atomic>
+#include <semaphore>
 #include <thread>
 
 #include "absl/strings/match.h"
@@ -212,6 +214,108 @@ TEST_F(LifecycleTest, AStuckReaderDoesNotHoldTheDrain) {
   const absl::Time begin = absl::Now();
   server().Drain(absl::Milliseconds(300));
   EXPECT_LT(absl::Now() - begin, absl::Seconds(30));
+}
+
+/// A session "book" whose hub edge has 50,000 faces, and the slot of that edge. Its queries have all the steps
+/// that they want.
+class BusyTest : public LifecycleTest {
+ protected:
+  BusyTest() {
+    Limits limits;
+    limits.max_query_steps = uint64_t{1} << 62;
+    StartServer(limits);
+    EXPECT_TRUE(CreateSession("book").ok());
+    EXPECT_TRUE(CreateSession("other").ok());
+    MustApply(BookBatch("book", 50'000));
+    const SessionPtr book = *server().registry().Find("book");
+    EXPECT_TRUE(book->Read([this](const SessionView& view) {
+                      hub_ = view.mesh.FindEdge(VertexId(0), VertexId(1)).slot();
+                      return absl::OkStatus();
+                    })
+                    .ok());
+  }
+
+  /// Asks for what takes hours and is not waited for.
+  grpc::Status AskForHours(absl::Duration deadline, int rows = 1'000'000) {
+    grpc::ClientContext context;
+    context.set_deadline(absl::ToChronoTime(absl::Now() + deadline));
+    const auto stream = queries().GetNeighbors(&context, CellsOfEdges("book", hub_, rows));
+    v1::GetNeighborsResponse response;
+    while (stream->Read(&response)) {
+    }
+    return stream->Finish();
+  }
+
+  Slot hub_ = kNoSlot;
+};
+
+TEST_F(BusyTest, ACallThatNobodyWaitsForEnds) {
+  // As many as there are threads of both kinds, and more.
+  std::vector<std::thread> callers;
+  for (int i = 0; i < 24; ++i) {
+    callers.emplace_back([&, i] {
+      EXPECT_EQ(AskForHours(absl::Milliseconds(300), i % 2 == 0 ? 1'000'000 : 19'000).error_code(),
+                grpc::DEADLINE_EXCEEDED);
+    });
+  }
+  for (std::thread& caller : callers) caller.join();
+  MustApply(TetBatch("other"));
+  MustApply(TetBatch("book"));  // a writer: the readers must be gone
+  EXPECT_EQ(GetSession("book").revision(), 2);
+}
+
+TEST_F(BusyTest, DrainEndsWhatComputes) {
+  std::vector<std::thread> callers;
+  for (int i = 0; i < 4; ++i) {
+    callers.emplace_back([&, i] { EXPECT_FALSE(AskForHours(kPatience, i % 2 == 0 ? 1'000'000 : 19'000).ok()); });
+  }
+  MustApply(TetBatch("other"));  // a round trip or two, in which they get there
+  const absl::Time begin = absl::Now();
+  server().Drain(absl::Milliseconds(200));
+  EXPECT_LT(absl::Now() - begin, absl::Seconds(20));
+  for (std::thread& caller : callers) caller.join();
+}
+
+TEST_F(BusyTest, ALockedSessionKeepsNoThreadFromOthers) {
+  std::binary_semaphore holds{0}, enough{0};
+  std::thread reader([&] {
+    const SessionPtr book = *server().registry().Find("book");
+    EXPECT_TRUE(book->Read([&](const SessionView&) {
+                      holds.release();
+                      enough.acquire();
+                      return absl::OkStatus();
+                    })
+                    .ok());
+  });
+  holds.acquire();
+  constexpr int kCalls = 100;
+  const v1::ApplyEditsRequest batch = TetBatch("book");
+  v1::GetSessionRequest get;
+  get.set_name("book");
+  std::vector<PatientContext> contexts(2 * kCalls);
+  std::vector<v1::ApplyEditsResponse> applied(kCalls);
+  std::vector<v1::GetSessionResponse> got(kCalls);
+  std::atomic<int> answers{0}, failures{0};
+  const auto done = [&](const grpc::Status& status) {
+    if (!status.ok()) ++failures;
+    ++answers;
+  };
+  for (int i = 0; i < kCalls; ++i) {
+    edits().async()->ApplyEdits(&contexts[2 * i], &batch, &applied[i], done);
+    sessions().async()->GetSession(&contexts[2 * i + 1], &get, &got[i], done);
+  }
+  for (int i = 0; i < 50; ++i) {
+    MustApply(TetBatch("other"));
+    EXPECT_EQ(GetSession("other").revision(), i + 1);
+  }
+  EXPECT_EQ(answers, 0);
+  enough.release();
+  reader.join();
+  const absl::Time deadline = absl::Now() + kPatience;
+  while (answers < 2 * kCalls && absl::Now() < deadline) std::this_thread::yield();
+  EXPECT_EQ(answers, 2 * kCalls);
+  EXPECT_EQ(failures, 0);
+  EXPECT_EQ(GetSession("book").revision(), 1 + kCalls);
 }
 
 TEST_F(LifecycleTest, ADestroyedServerLeavesNothingBehind) {

@@ -92,6 +92,35 @@ class QueriesRpcTest : public ServerTest {
 
 v1::EntityKind Proto(EntityKind kind) { return static_cast<v1::EntityKind>(Dimension(kind) + 1); }
 
+TEST_F(QueriesRpcTest, AnswersThatWaitToBeReadAreBounded) {
+  Limits limits;
+  limits.max_answer_bytes = 30'000'000;
+  StartServer(limits);
+  ASSERT_TRUE(CreateSession("mesh").ok());
+  v1::ApplyEditsRequest many = Batch("mesh");
+  *many.add_edits()->mutable_add_vertices() = AddVerticesMessage(SomePoints(150'000));
+  for (int i = 0; i < 4; ++i) MustApply(many);
+  v1::GetEntitiesRequest request;
+  request.set_session("mesh");
+  request.set_kind(v1::ENTITY_KIND_VERTEX);
+  *request.mutable_selection() = SelectAll();
+  {
+    // The first chunk arrives when all is gathered; the flow of bytes stops long before the last one does.
+    PatientContext context;
+    const auto unread = queries().GetEntities(&context, request);
+    v1::GetEntitiesResponse chunk;
+    ASSERT_TRUE(unread->Read(&chunk));
+    std::vector<v1::GetEntitiesResponse> chunks;
+    ExpectError(Entities(v1::ENTITY_KIND_VERTEX, SelectAll(), &chunks), grpc::RESOURCE_EXHAUSTED,
+                reason::kLimitExceeded, "limit", "max_answer_bytes");
+    while (unread->Read(&chunk)) {
+    }
+    EXPECT_TRUE(unread->Finish().ok());
+  }
+  std::vector<v1::GetEntitiesResponse> chunks;
+  EXPECT_TRUE(Entities(v1::ENTITY_KIND_VERTEX, SelectAll(), &chunks).ok());
+}
+
 TEST_F(QueriesRpcTest, All16RelationsAreThoseOfTheMesh) {
   const Mesh mesh = TetGrid(5, 5, 5);
   ASSERT_TRUE(Import("mesh", mesh).ok());

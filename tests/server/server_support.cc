@@ -187,6 +187,24 @@ v1::ElementBlock Block(v1::ElementType type, const std::vector<Slot>& vertices) 
   return block;
 }
 
+v1::ApplyEditsRequest BookBatch(const std::string& session, int n) {
+  v1::ApplyEditsRequest request = Batch(session);
+  *request.add_edits()->mutable_add_vertices() = AddVerticesMessage(SomePoints(n + 2));
+  std::vector<Slot> pages;
+  for (int i = 0; i < n; ++i) pages.insert(pages.end(), {kNewVertex, kNewVertex | 1, kNewVertex | (2 + i)});
+  *request.add_edits()->mutable_add_elements() = Block(v1::ELEMENT_TYPE_TRIANGLE, pages);
+  return request;
+}
+
+v1::GetNeighborsRequest CellsOfEdges(const std::string& session, Slot edge, int times) {
+  v1::GetNeighborsRequest request;
+  request.set_session(session);
+  request.set_from(v1::ENTITY_KIND_EDGE);
+  request.set_to(v1::ENTITY_KIND_CELL);
+  *request.mutable_selection() = SelectIds(std::vector<Slot>(times, edge));
+  return request;
+}
+
 v1::ApplyEditsRequest TetBatch(const std::string& session) {
   constexpr Slot kNew = 0x80000000u;
   v1::ApplyEditsRequest request = Batch(session);

@@ -104,6 +104,10 @@ class PatientContext : public grpc::ClientContext {
 v1::ApplyEditsRequest Batch(const std::string& session);
 v1::AddVertices AddVerticesMessage(const std::vector<Point>& points);
 v1::ElementBlock Block(v1::ElementType type, const std::vector<Slot>& vertices);
+/// `n` triangles that share the edge between vertices 0 and 1, and no cell.
+v1::ApplyEditsRequest BookBatch(const std::string& session, int n);
+/// The cells of one edge, over and over: hours of work for an empty answer, in a book of many pages.
+v1::GetNeighborsRequest CellsOfEdges(const std::string& session, Slot edge, int times);
 /// Four vertices and the tetrahedron over them.
 v1::ApplyEditsRequest TetBatch(const std::string& session);
 v1::AttributeSpec Spec(const std::string& name, v1::EntityKind kind, v1::AttributeType type, int components);

@@ -242,6 +242,34 @@ TEST_F(SubscribeRpcTest, DeletionEndsTheStream) {
   ExpectError(subscriber.Finish(), grpc::NOT_FOUND, reason::kSessionDeleted, "session", "mesh");
 }
 
+TEST_F(SubscribeRpcTest, ANamesakeIsNotResumed) {
+  MustApply(TetBatch("mesh"));
+  Subscriber first(subscriptions(), From(0));
+  first.ReadTo(1);
+  const std::string uid = first.last().session_uid();
+  EXPECT_FALSE(uid.empty());
+  EXPECT_EQ(GetSession("mesh").uid(), uid);
+  v1::SubscribeRequest resume = From(1);
+  resume.set_session_uid(uid);
+  {
+    PatientContext context;
+    const auto again = subscriptions().Subscribe(&context, resume);
+    v1::SubscribeResponse nothing_new;
+    ASSERT_TRUE(again->Read(&nothing_new));
+    EXPECT_EQ(nothing_new.session_uid(), uid);
+    context.TryCancel();
+  }
+  ASSERT_TRUE(DeleteSession("mesh").ok());
+  ASSERT_TRUE(CreateSession("mesh").ok());
+  EXPECT_NE(GetSession("mesh").uid(), uid);
+  for (int i = 0; i < 3; ++i) {  // also where the revision would lie in the future
+    Subscriber refused(subscriptions(), resume);
+    EXPECT_FALSE(refused.ReadOne());
+    ExpectError(refused.Finish(), grpc::ABORTED, reason::kSessionRecreated, "expected", uid);
+    MustApply(TetBatch("mesh"));
+  }
+}
+
 TEST_F(SubscribeRpcTest, OddRequestsAreRefused) {
   MustApply(TetBatch("mesh"));
   const auto expect = [&](const v1::SubscribeRequest& request, grpc::StatusCode code, const char* why,

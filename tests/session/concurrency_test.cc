@@ -138,7 +138,7 @@ TEST(ConcurrencyTest, FollowersComeAndGoWhileTheSessionIsEditedAndDeleted) {
 TEST(ConcurrencyTest, OneOfManyImportsWins) {
   Daemon daemon;
   const SessionPtr session = daemon.NewSession();
-  ImportGate gate(8);
+  ImportGate gate(Limits{.max_concurrent_imports = 8});
   std::atomic<int> won{0};
   std::vector<std::thread> importers;
   for (int i = 0; i < 4; ++i) {

@@ -48,7 +48,7 @@ class ImporterTest : public ::testing::Test {
   }
 
   Daemon daemon_;
-  ImportGate gate_{2};
+  ImportGate gate_{Limits{.max_concurrent_imports = 2}};
   TestMonitor monitor_;
 };
 
@@ -304,7 +304,7 @@ TEST(ImporterLimitsTest, LimitsAreNamedBeforeAndWhileReceiving) {
   limits.max_cells = 1;
   limits.max_session_bytes = 1 << 20;
   Daemon daemon(limits);
-  ImportGate gate(2);
+  ImportGate gate(Limits{.max_concurrent_imports = 2});
   const SessionPtr session = daemon.NewSession();
   const auto expect = [](const absl::Status& status, const char* limit) {
     EXPECT_EQ(RefusalOf(status), (Refusal{absl::StatusCode::kResourceExhausted, reason::kLimitExceeded}))

@@ -4,6 +4,8 @@
 
 #include "core/codec/surface_codec.h"
 #include "server/session/export.h"
+#include "server/session/row_walk.h"
+#include "server/session/session_errors.h"
 #include "tests/session/session_support.h"
 #include "tests/support/meshes.h"
 #include "tests/support/oracle.h"
@@ -166,7 +168,7 @@ TEST(QueriesTest, AnswersAreLimited) {
   EXPECT_EQ(MetadataOf(neighbors.status(), "limit"), "max_query_bytes");
   EXPECT_EQ(RefusalOf(QueryEntities(*session, EntityKind::kVertex, {})), limited);
   EXPECT_EQ(RefusalOf(ExportSession(*session)), limited);
-  EXPECT_EQ(RefusalOf(QuerySurface(*session, 14)), limited);
+  EXPECT_EQ(RefusalOf(QuerySurface(*session)), limited);
   EXPECT_TRUE(QueryNeighbors(*session, {EntityKind::kCell, EntityKind::kEdge}, Range(0, 10)).ok());
 }
 
@@ -227,17 +229,130 @@ TEST(QueriesTest, BoundaryIsThatOfTheMesh) {
             (Refusal{absl::StatusCode::kInvalidArgument, reason::kBadEntityKind}));
 }
 
+/// A book: `n` triangles that share the edge between vertices 0 and 1, and no cell.
+std::vector<Edit> Book(int n) {
+  AddElementsEdit pages{ElementType::kTriangle, {}};
+  for (int i = 0; i < n; ++i) {
+    pages.vertices.insert(pages.vertices.end(), {kNewVertex, kNewVertex | 1, kNewVertex | Slot(2 + i)});
+  }
+  return {AddSomeVertices(n + 2), pages};
+}
+
+Slot HubEdge(const Session& session) {
+  Slot hub = kNoSlot;
+  EXPECT_TRUE(session
+                  .Read([&](const SessionView& view) {
+                    hub = view.mesh.FindEdge(VertexId(0), VertexId(1)).slot();
+                    return absl::OkStatus();
+                  })
+                  .ok());
+  return hub;
+}
+
+/// Stops at the n-th check.
+class StopAt : public StopSignal {
+ public:
+  explicit StopAt(int check) : left_(check) {}
+  absl::Status Check() const override { return --left_ > 0 ? absl::OkStatus() : CallCancelled(); }
+  int left() const { return left_; }
+
+ private:
+  mutable int left_;
+};
+
+TEST(QueriesTest, WorkIsLimitedWhereTheAnswerIsEmpty) {
+  Limits limits;
+  limits.max_query_steps = 1'000'000;
+  Daemon daemon(limits);
+  const SessionPtr session = daemon.NewSession();
+  MustApply(*session, Book(20'000));
+  const Slot hub = HubEdge(*session);
+  const Relation relation{EntityKind::kEdge, EntityKind::kCell};
+  EXPECT_TRUE(QueryNeighbors(*session, relation, Ids(std::vector<Slot>(40, hub))).ok());
+  const auto refused = QueryNeighbors(*session, relation, Ids(std::vector<Slot>(60, hub)));
+  EXPECT_EQ(RefusalOf(refused), (Refusal{absl::StatusCode::kResourceExhausted, reason::kLimitExceeded}));
+  EXPECT_EQ(MetadataOf(refused.status(), "limit"), "max_query_steps");
+}
+
+TEST(QueriesTest, WhatNobodyWaitsForIsNotBegunAndStopsWithinARow) {
+  Daemon daemon;
+  const SessionPtr session = daemon.NewSession();
+  MustApply(*session, Book(200'000));
+  const Relation relation{EntityKind::kEdge, EntityKind::kCell};
+  const Selection one_row = Ids({HubEdge(*session)});
+  for (int check = 1; check <= 20; ++check) {
+    const StopAt stop(check);
+    EXPECT_EQ(QueryNeighbors(*session, relation, one_row, {stop}).status().code(),
+              absl::StatusCode::kCancelled);
+    EXPECT_EQ(stop.left(), 0) << "it went on";
+  }
+  const StopAt never(1000);
+  EXPECT_TRUE(QueryNeighbors(*session, relation, one_row, {never}).ok());
+  EXPECT_LE(1000 - never.left(), 200'000 / int{QueryBudget::kStepsPerCheck} + 2);
+  const StopAt at_once(1);
+  EXPECT_EQ(QueryEntities(*session, EntityKind::kFace, {}, {at_once}).status().code(),
+            absl::StatusCode::kCancelled);
+  EXPECT_EQ(ExportSession(*session, {at_once}).status().code(), absl::StatusCode::kCancelled);
+  EXPECT_EQ(QuerySurface(*session, {at_once}).status().code(), absl::StatusCode::kCancelled);
+  EXPECT_EQ(QueryBoundary(*session, EntityKind::kEdge, {at_once}).status().code(),
+            absl::StatusCode::kCancelled);
+}
+
+TEST(QueriesTest, LongRowsAreTheSameRows) {
+  const Limits limits;
+  for (const NamedMesh& named : AllMeshes()) {
+    SCOPED_TRACE(named.name);
+    for (EntityKind from : kEntityKinds) {
+      for (EntityKind to : kEntityKinds) {
+        QueryBudget budget(limits, {});
+        const Relation relation{from, to};
+        RowWalk walk(named.mesh, relation, budget, /*long_row=*/0);
+        std::vector<Slot> row;
+        for (Slot slot : LiveSlots(named.mesh, from)) {
+          ASSERT_TRUE(walk.Walk(slot, row).ok());
+          std::vector<Slot> expected;
+          AppendNeighbors(named.mesh, relation, slot, expected);
+          EXPECT_EQ(row, expected) << EntityKindName(from) << " " << slot << " to " << EntityKindName(to);
+        }
+      }
+    }
+  }
+}
+
+TEST(QueriesTest, AnswersThatWaitAreCounted) {
+  Daemon daemon;
+  const SessionPtr session = daemon.NewSession();
+  MustApply(*session, EditsOf(TetGrid(10, 10, 10)));
+  const auto budget = std::make_shared<Budget>("max_answer_bytes", 300'000);
+  const auto query = [&](Lease& lease) {
+    return QueryEntities(*session, EntityKind::kCell, Range(0, 4000), {StopSignal::Never(), &lease});
+  };
+  {
+    Lease first(budget), second(budget);
+    const auto answer = query(first);
+    ASSERT_TRUE(answer.ok()) << answer.status();
+    EXPECT_GE(first.held(), answer->chunks[0].vertices.size() * sizeof(Slot));
+    const auto refused = query(second);
+    EXPECT_EQ(RefusalOf(refused), (Refusal{absl::StatusCode::kResourceExhausted, reason::kLimitExceeded}));
+    EXPECT_EQ(MetadataOf(refused.status(), "limit"), "max_answer_bytes");
+    first.Shrink(first.held());
+    EXPECT_TRUE(query(second).ok());
+  }
+  EXPECT_EQ(budget->used(), 0u);
+}
+
 TEST(QueriesTest, SurfaceHasTheBoundaryAndTheFacesThatAreElements) {
   Daemon daemon;
   const SessionPtr session = daemon.NewSession();
-  EXPECT_EQ(QuerySurface(*session, 14).status().code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_EQ(EncodeSurface(QuerySurface(*session)->surface, 14).status().code(),
+            absl::StatusCode::kFailedPrecondition);
   MustApply(*session, EditsOf(HexGrid(2, 1, 1)));
   MustApply(*session,
             {AddVerticesEdit{{{9, 9, 9}}}, AddElementsEdit{ElementType::kTriangle, {0, 1, kNewVertex}}});
-  const auto answer = QuerySurface(*session, 14);
+  const auto answer = QuerySurface(*session);
   ASSERT_TRUE(answer.ok()) << answer.status();
   EXPECT_EQ(answer->revision, 2);
-  const auto surface = DecodeSurface(answer->drc);
+  const auto surface = DecodeSurface(*EncodeSurface(answer->surface, 14));
   ASSERT_TRUE(surface.ok()) << surface.status();
   EXPECT_EQ(surface->triangles.size(), 10u * 2 + 1);
 }

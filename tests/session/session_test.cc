@@ -1,5 +1,7 @@
 #include "server/session/session.h"
 
+#include <unistd.h>
+
 #include "core/mesh/validate.h"
 #include "server/session/fingerprint.h"
 #include "tests/session/session_support.h"
@@ -219,6 +221,36 @@ TEST_F(SessionTest, ASessionThatGrewTooLargeTakesRemovalsOnly) {
   EXPECT_EQ(RefusalOf(status), (Refusal{absl::StatusCode::kResourceExhausted, reason::kLimitExceeded}));
   EXPECT_EQ(MetadataOf(status, "limit"), "max_session_bytes");
   MustApply(*session, {RemoveVerticesEdit{{0, 1, 2}}});
+}
+
+TEST_F(SessionTest, FewRowsOfManyPagesAreForeseen) {
+  Limits limits;
+  limits.max_session_bytes = 40 << 20;
+  Daemon daemon(limits);
+  const SessionPtr session = daemon.NewSession();
+  MustApply(*session, {AddSomeVertices(300'000)});
+  const AttributeSpec spec{"wide", EntityKind::kVertex, AttributeType::kFloat64, 16};
+  MustApply(*session, {AddAttributeEdit{spec}});
+  std::vector<Edit> near, far;
+  for (Slot slot = 0; slot < 500; ++slot) {
+    near.push_back(SetAttributeEdit{spec, {slot}, std::vector<uint8_t>(spec.row_bytes())});
+    far.push_back(SetAttributeEdit{spec, {slot * 600}, std::vector<uint8_t>(spec.row_bytes())});
+  }
+  const auto refused = session->Apply(far, {});
+  EXPECT_EQ(RefusalOf(refused), (Refusal{absl::StatusCode::kResourceExhausted, reason::kLimitExceeded}));
+  EXPECT_EQ(MetadataOf(refused.status(), "limit"), "max_session_bytes");
+  MustApply(*session, near);  // one page, however many edits
+  EXPECT_LT(session->Info()->memory_bytes, limits.max_session_bytes);
+  far.resize(100);
+  const uint64_t before = session->Info()->memory_bytes;
+  MustApply(*session, far);
+  EXPECT_GE(session->Info()->memory_bytes, before + 99 * 64 * 1024);  // what was foreseen
+}
+
+TEST_F(SessionTest, DefaultsFitTheMachine) {
+  EXPECT_LE(Limits().max_session_bytes, uint64_t{64} << 30);
+  EXPECT_LE(Limits().max_session_bytes,
+            static_cast<uint64_t>(sysconf(_SC_PHYS_PAGES)) * sysconf(_SC_PAGESIZE) / 4 * 3);
 }
 
 TEST_F(SessionTest, DeleteEndsEverything) {

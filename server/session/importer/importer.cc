@@ -58,15 +58,16 @@ absl::StatusOr<std::unique_ptr<Importer>> Importer::Start(SessionPtr session, Im
   // A retry has to arrive in full before it is known to be one.
   if (options.request_id.empty() || options.validate_only) DYNMESH_RETURN_IF_ERROR(session->CheckEmpty());
   DYNMESH_ASSIGN_OR_RETURN(std::unique_ptr<ImportGate::Ticket> ticket, gate.Enter());
-  return std::unique_ptr<Importer>(new Importer(std::move(session), std::move(ticket), options));
+  return std::unique_ptr<Importer>(
+      new Importer(std::move(session), std::move(ticket), Lease(gate.staged()), options));
 }
 
-Importer::Importer(SessionPtr session, std::unique_ptr<ImportGate::Ticket> ticket,
+Importer::Importer(SessionPtr session, std::unique_ptr<ImportGate::Ticket> ticket, Lease staged,
                    const ImportOptions& options)
     : session_(std::move(session)),
       ticket_(std::move(ticket)),
       options_(options),
-      staged_(session_->limits()) {}
+      staged_(session_->limits(), std::move(staged)) {}
 
 absl::StatusOr<Importer::OutcomePtr> Importer::Finish(ImportMonitor& monitor) {
   DYNMESH_RETURN_IF_ERROR(CheckCounts());

@@ -32,7 +32,7 @@ struct ImportOptions {
   std::string request_id = {};
 };
 
-/// Counts the imports that are under way in a daemon. Thread safety: full.
+/// Counts the imports that are under way in a daemon, and the bytes that they have staged. Thread safety: full.
 class ImportGate {
  public:
   /// Leaves the gate when destroyed.
@@ -47,14 +47,19 @@ class ImportGate {
     std::atomic<uint32_t>& count_;
   };
 
-  explicit ImportGate(uint32_t max_imports) : max_imports_(max_imports) {}
+  explicit ImportGate(const Limits& limits)
+      : max_imports_(limits.max_concurrent_imports),
+        staged_(std::make_shared<Budget>("max_staged_bytes", limits.max_staged_bytes)) {}
 
   /// Errors: RESOURCE_EXHAUSTED LIMIT_EXCEEDED (max_concurrent_imports).
   absl::StatusOr<std::unique_ptr<Ticket>> Enter();
 
+  const std::shared_ptr<Budget>& staged() const { return staged_; }
+
  private:
   const uint32_t max_imports_;
   std::atomic<uint32_t> count_{0};
+  const std::shared_ptr<Budget> staged_;
 };
 
 /// Fills an empty session from pieces that arrive one after the other, as revision 1.
@@ -84,7 +89,8 @@ class Importer {
  private:
   using OutcomePtr = std::shared_ptr<const ImportOutcome>;
 
-  Importer(SessionPtr session, std::unique_ptr<ImportGate::Ticket> ticket, const ImportOptions& options);
+  Importer(SessionPtr session, std::unique_ptr<ImportGate::Ticket> ticket, Lease staged,
+           const ImportOptions& options);
   absl::Status CheckCounts() const;
   absl::StatusOr<OutcomePtr> BuildAndAdopt(ImportMonitor& monitor);
 

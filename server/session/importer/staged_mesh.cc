@@ -158,6 +158,7 @@ uint64_t StagedMesh::Fingerprint() const {
 
 absl::Status StagedMesh::ChargeMemory(uint64_t bytes) {
   bytes_ += bytes + kPieceOverheadBytes;
+  DYNMESH_RETURN_IF_ERROR(lease_.Grow(bytes + kPieceOverheadBytes));
   if (bytes_ <= limits_.max_session_bytes) return absl::OkStatus();
   return LimitExceeded("max_session_bytes", limits_.max_session_bytes, bytes_);
 }

@@ -5,11 +5,13 @@
 #include <cstdint>
 #include <list>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/status/status.h"
 #include "core/mesh/estimate.h"
 #include "core/mesh/mesh.h"
+#include "server/session/budget.h"
 #include "server/session/importer/byte_queue.h"
 #include "server/session/limits.h"
 
@@ -36,7 +38,8 @@ struct StagedColumn {
 /// over. Thread safety: that of std::vector.
 class StagedMesh {
  public:
-  explicit StagedMesh(const Limits& limits) : limits_(limits) {}
+  /// `lease`: grows by what is staged.
+  explicit StagedMesh(const Limits& limits, Lease lease = {}) : limits_(limits), lease_(std::move(lease)) {}
 
   /// f64[3 * n]. Errors: BAD_ARRAY_LENGTH, NON_FINITE_VALUE, LIMIT_EXCEEDED (max_vertices).
   absl::Status AddPositions(std::string bytes);
@@ -68,6 +71,7 @@ class StagedMesh {
   const Limits limits_;
   uint64_t num_vertices_ = 0;
   uint64_t bytes_ = 0;
+  Lease lease_;
   ElementTypeCounts type_counts_ = {};
   ByteQueue positions_;
   std::array<std::list<StagedRun>, kNumEntityKinds> runs_;

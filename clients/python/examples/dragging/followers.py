@@ -16,15 +16,20 @@ import dynmesh
 
 _START_TIMEOUT_S = 60.0
 _FOLLOW_TIMEOUT_S = 120.0
+_SLOW_READ_AHEAD_BYTES = 64 << 10
 
 
 @dataclass(frozen=True)
 class Plan:
-    """How a follower follows: a name for the tables, the codec, and the least seconds between two deltas."""
+    """How a follower follows: a name for the tables, the codec, and the seconds that it spends on each delta.
+
+    While it does it reads nothing, so what the server sends gets stuck on the way, where there is room for
+    64 KiB: the server then waits, and sends fewer, larger deltas.
+    """
 
     name: str
     codec: str
-    min_interval_s: float = 0.0
+    pause_s: float = 0.0
 
 
 @dataclass
@@ -150,7 +155,8 @@ class _Follower:
 
     def _follow(self, former: dynmesh.Mirror | None) -> dynmesh.Mirror:
         plan = self._report.plan
-        return self._session.mirror(codec=plan.codec, min_interval=plan.min_interval_s, from_mirror=former)
+        on_delta = (lambda update: time.sleep(plan.pause_s)) if plan.pause_s else None
+        return self._session.mirror(codec=plan.codec, from_mirror=former, on_delta=on_delta)
 
     def _count(self) -> None:
         """Adds what the mirror has received since it was last counted."""
@@ -180,7 +186,8 @@ class _Counters:
 
 def _serve(pipe: Connection, plan: Plan, target: str, session: str) -> None:
     """Main function of a follower process."""
-    with dynmesh.connect(target) as client:
+    read_ahead_bytes = _SLOW_READ_AHEAD_BYTES if plan.pause_s else None
+    with dynmesh.connect(target, read_ahead_bytes=read_ahead_bytes) as client:
         follower = _Follower(plan, client.session(session))
         while True:
             try:

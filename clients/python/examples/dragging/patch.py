@@ -82,7 +82,7 @@ class Sent:
     moved: int
     removed: int
     added: int
-    new_handles: NDArray[np.uint32]
+    new_handles: NDArray[np.int64]
     lost_vertices: Ints
 
 
@@ -120,7 +120,7 @@ def fill_batch(
     batch.remove_vertices(lost)
     new = np.setdiff1d(np.arange(old, len(change.points)), change.lost)
     handles = batch.add_vertices(change.points[new])
-    names = np.zeros(len(change.points), dtype=np.uint32)
+    names = np.zeros(len(change.points), dtype=np.int64)
     names[:old] = patch.vertices
     names[new] = handles
     for of_type, corners in change.added:

@@ -10,9 +10,19 @@ from typing import Any, TypeVar
 
 import grpc
 
-from .errors import InvalidArgumentError, UnavailableError, from_rpc_error
+from .errors import (
+    DynmeshError,
+    InvalidArgumentError,
+    ResourceExhaustedError,
+    UnavailableError,
+    from_rpc_error,
+)
 
 Reply = TypeVar("Reply")
+
+# What dynmeshd's flag of that name is by default; gRPC refuses messages that are larger by this factor.
+DEFAULT_MAX_MESSAGE_BYTES = 4 << 20
+HARD_MESSAGE_FACTOR = 4
 
 _FIRST_BACKOFF_S = 0.05
 _MAX_BACKOFF_S = 2.0
@@ -44,16 +54,35 @@ class Caller:
         Seconds that a call may take unless it says otherwise; ``math.inf`` for no limit.
     retries : int
         How often a call that may be repeated is repeated when nobody answers.
+    max_message_bytes : int
+        The server's limit of that name.
     """
 
-    def __init__(self, timeout: float, retries: int) -> None:
+    def __init__(self, timeout: float, retries: int, max_message_bytes: int = DEFAULT_MAX_MESSAGE_BYTES) -> None:
         self._timeout = timeout
         self._retries = retries
+        self._max_message_bytes = max_message_bytes
+
+    def check_size(self, request: Any) -> None:
+        """Refuses a message that gRPC would refuse at the other end without saying why.
+
+        Raises `ResourceExhaustedError` LIMIT_EXCEEDED (max_message_bytes).
+        """
+        size = request.ByteSize()
+        if size <= HARD_MESSAGE_FACTOR * self._max_message_bytes:
+            return  # what is a little too large the server refuses by name, and knows its limit better
+        limit = self._max_message_bytes
+        raise ResourceExhaustedError(
+            f"max_message_bytes is limited to {limit}, and {size} was asked for",
+            reason="LIMIT_EXCEEDED",
+            metadata={"limit": "max_message_bytes", "value": str(limit), "requested": str(size)},
+        )
 
     def unary(
         self, method: Callable[..., Reply], request: Any, timeout: float | None, *, repeatable: bool
     ) -> Reply:
         """One request, one reply. `repeatable`: doing it twice is the same as doing it once."""
+        self.check_size(request)
         deadline = time.monotonic() + self._seconds(timeout)
         backoff = Backoff()
         for left in reversed(range(self._retries + 1 if repeatable else 1)):
@@ -70,13 +99,28 @@ class Caller:
         self, method: Callable[..., Iterable[Reply]], request: Any, timeout: float | None
     ) -> Iterator[Reply]:
         """The replies of a streaming call; cancelled when the iterator is dropped early."""
+        oversize: list[DynmeshError] = []
+        if hasattr(request, "ByteSize"):
+            self.check_size(request)
+        else:
+            request = self._checked(request, oversize)
         call = method(request, timeout=_grpc_timeout(self._seconds(timeout)))
         try:
             yield from call
         except grpc.RpcError as error:
-            raise from_rpc_error(error) from None
+            raise oversize[0] if oversize else from_rpc_error(error) from None
         finally:
             call.cancel()  # type: ignore[attr-defined]
+
+    def _checked(self, requests: Iterable[Any], refused: list[DynmeshError]) -> Iterator[Any]:
+        """`requests` up to one that is too large, which breaks the call; `refused` gets the error."""
+        for request in requests:
+            try:
+                self.check_size(request)
+            except DynmeshError as error:
+                refused.append(error)
+                raise
+            yield request
 
     def _seconds(self, timeout: float | None) -> float:
         seconds = self._timeout if timeout is None else timeout

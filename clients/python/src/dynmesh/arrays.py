@@ -21,6 +21,13 @@ def as_ids(values: ArrayLike, what: str = "ids") -> Ids:
     return _as_uint32(values, what, ndim=1)
 
 
+def as_int64(value: int, what: str) -> int:
+    """`value` for an int64 field. Raises `InvalidArgumentError` for what does not fit."""
+    if isinstance(value, (int, np.integer)) and not isinstance(value, bool) and -(2**63) <= value < 2**63:
+        return int(value)
+    raise InvalidArgumentError(f"{what} is no 64-bit integer: {value!r}", reason="BAD_ARGUMENT", metadata={"field": what})
+
+
 def as_id_rows(values: ArrayLike, width: int, what: str) -> Ids:
     """`values` as uint32[n, width]; an empty list is no rows."""
     rows = _as_uint32(values, what, ndim=None)
@@ -45,6 +52,14 @@ def as_points(values: ArrayLike, what: str = "positions") -> Points:
     if points.dtype.kind not in "iuf" or points.dtype.itemsize > 8:
         raise InvalidArgumentError(f"{what} must be real numbers, not {points.dtype}", reason="BAD_ARGUMENT")
     return points.astype(np.float64, copy=False)
+
+
+def as_integers(values: ArrayLike) -> NDArray[np.int64] | None:
+    """`values` as int64 of any shape; None for what are no such integers."""
+    array = _as_array(values, "ids")
+    if array.size == 0 or array.dtype.kind not in "iu" or (array.dtype == np.uint64 and (array >> 63).any()):
+        return None
+    return array.astype(np.int64, copy=False)
 
 
 def u32_bytes(values: Ids) -> bytes:

@@ -8,7 +8,7 @@ from types import TracebackType
 
 import grpc
 
-from ._calls import Caller
+from ._calls import DEFAULT_MAX_MESSAGE_BYTES, Caller
 from .errors import InvalidArgumentError
 from .info import SessionInfo, info_from_proto
 from .session import Session
@@ -18,10 +18,11 @@ DEFAULT_TARGET = "127.0.0.1:7447"
 DEFAULT_TIMEOUT_S = 60.0
 
 _PAGE_SIZE = 1000
+_LEAST_WINDOW = 64 << 10
 _POLICIES = {"keep": sessions_pb2.DUPLICATE_POLICY_KEEP, "refuse": sessions_pb2.DUPLICATE_POLICY_REFUSE}
 _CHANNEL_OPTIONS = (
     ("grpc.max_receive_message_length", -1),  # deltas are as large as the server's own limit allows
-    ("grpc.max_send_message_length", -1),  # the server refuses what is too large, and says so
+    ("grpc.max_send_message_length", -1),  # Caller.check_size and the server refuse what is too large
     ("grpc.keepalive_time_ms", 30_000),  # a mirror learns of a peer that vanished; the server allows it
     ("grpc.keepalive_timeout_ms", 10_000),
     ("grpc.http2.max_pings_without_data", 0),
@@ -37,10 +38,13 @@ class Client:
     Thread safety: everything may be called from any thread.
     """
 
-    def __init__(self, target: str, timeout: float, retries: int) -> None:
+    def __init__(
+        self, target: str, timeout: float, retries: int, max_message_bytes: int, read_ahead_bytes: int | None
+    ) -> None:
         self.target = target
-        self._channel = grpc.insecure_channel(target, options=_CHANNEL_OPTIONS)
-        self._caller = Caller(timeout, retries)
+        options = (*_CHANNEL_OPTIONS, *_window_options(read_ahead_bytes))
+        self._channel = grpc.insecure_channel(target, options=options)
+        self._caller = Caller(timeout, retries, max_message_bytes)
         self._sessions = sessions_pb2_grpc.SessionServiceStub(self._channel)
 
     def __repr__(self) -> str:
@@ -111,7 +115,14 @@ class Client:
         return self.session(name).delete(etag=etag, timeout=timeout)
 
 
-def connect(target: str = DEFAULT_TARGET, *, timeout: float = DEFAULT_TIMEOUT_S, retries: int = 2) -> Client:
+def connect(
+    target: str = DEFAULT_TARGET,
+    *,
+    timeout: float = DEFAULT_TIMEOUT_S,
+    retries: int = 2,
+    max_message_bytes: int = DEFAULT_MAX_MESSAGE_BYTES,
+    read_ahead_bytes: int | None = None,
+) -> Client:
     """Attaches to a daemon. Returns at once: the first call finds out whether one is there.
 
     Parameters
@@ -122,5 +133,22 @@ def connect(target: str = DEFAULT_TARGET, *, timeout: float = DEFAULT_TIMEOUT_S,
         Seconds that a call may take unless it says otherwise; ``float("inf")`` for no limit.
     retries : int
         How often reading calls, and edits by their request ids, are repeated when nobody answers.
+    max_message_bytes : int
+        The server's flag of that name, where it is not the default. A request of more than four times that is
+        not sent, because gRPC would refuse it at the other end without saying why.
+    read_ahead_bytes : int, optional
+        How much of each answer the server may send ahead of what has been read, 64 KiB at least. By default as
+        much as keeps the line busy, up to some megabytes; what a slow mirror has not read yet is that much out
+        of date. Over a line that is both fast and far, a small number makes answers slow.
     """
-    return Client(target, timeout, retries)
+    return Client(target, timeout, retries, max_message_bytes, read_ahead_bytes)
+
+
+def _window_options(read_ahead_bytes: int | None) -> tuple[tuple[str, int], ...]:
+    if read_ahead_bytes is None:
+        return ()
+    if not _LEAST_WINDOW <= read_ahead_bytes < 2**31:
+        raise InvalidArgumentError(
+            f"read_ahead_bytes is at least {_LEAST_WINDOW}, not {read_ahead_bytes}", reason="BAD_ARGUMENT"
+        )
+    return ("grpc.http2.bdp_probe", 0), ("grpc.http2.lookahead_bytes", read_ahead_bytes)

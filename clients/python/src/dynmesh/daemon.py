@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
 
+from ._calls import DEFAULT_MAX_MESSAGE_BYTES
 from .client import DEFAULT_TIMEOUT_S, Client, connect
 from .errors import LaunchError
 from .files import PathLike
@@ -62,9 +63,22 @@ class Daemon:
             self._client = self.connect()
         return self._client
 
-    def connect(self, *, timeout: float = DEFAULT_TIMEOUT_S, retries: int = 2) -> Client:
+    def connect(
+        self,
+        *,
+        timeout: float = DEFAULT_TIMEOUT_S,
+        retries: int = 2,
+        max_message_bytes: int = DEFAULT_MAX_MESSAGE_BYTES,
+        read_ahead_bytes: int | None = None,
+    ) -> Client:
         """Another client of this daemon: as `dynmesh.connect`."""
-        return connect(self.target, timeout=timeout, retries=retries)
+        return connect(
+            self.target,
+            timeout=timeout,
+            retries=retries,
+            max_message_bytes=max_message_bytes,
+            read_ahead_bytes=read_ahead_bytes,
+        )
 
     def log_tail(self, lines: int = _LOG_TAIL_LINES) -> str:
         """The last lines of the daemon's log."""

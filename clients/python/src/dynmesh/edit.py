@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
 from types import TracebackType
@@ -10,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import Ids, as_id_rows, as_ids, as_points, concatenate, f64_bytes, from_bytes, u32_bytes
+from .arrays import Ids, as_id_rows, as_integers, as_ids, as_points, concatenate, f64_bytes, from_bytes, u32_bytes
 from .checksum import Checksum
 from .columns import as_values, make_spec, values_bytes
 from .errors import InvalidArgumentError
@@ -18,8 +19,12 @@ from .info import Counts, MeshWarning, checksum_from_proto, counts_from_proto, w
 from .kinds import KindLike, TypeLike, as_element_type, as_kind
 from .v1 import edits_pb2, types_pb2
 
-# In a batch, vertex id NEW_VERTEX | k is the k-th vertex that the batch adds.
+# On the wire, vertex id NEW_VERTEX | k is the k-th vertex that the batch adds. A handle is that, and the number of its
+# batch in the upper half of an int64.
 NEW_VERTEX = 0x80000000
+_WIRE_MASK = 0xFFFFFFFF
+_NUMBER_MASK = 0x7FFFFFFF
+_batch_numbers = itertools.count(1)
 
 
 @dataclass(frozen=True)
@@ -34,6 +39,8 @@ class EditResult:
         For each edit the ids of what it added, in order.
     new_vertices : uint32[n]
         Ids of all vertices that the batch added, in order.
+    batch_number : int
+        Tells the batch's handles from those of others.
     """
 
     revision: int
@@ -42,15 +49,21 @@ class EditResult:
     checksum: Checksum
     counts: Counts
     warnings: tuple[MeshWarning, ...]
+    batch_number: int
 
     def resolve(self, vertices: ArrayLike) -> Ids:
         """Vertex ids for handles that `EditBatch.add_vertices` gave out; ids stay as they are.
 
         Parameters
         ----------
-        vertices : uint32, any shape
+        vertices : integers, any shape
+
+        Raises
+        ------
+        InvalidArgumentError
+            FOREIGN_HANDLE: a handle of another batch.
         """
-        ids = np.array(vertices, dtype=np.uint32)
+        ids = np.array(_to_wire(vertices, self.batch_number), dtype=np.uint32)
         handles = (ids & NEW_VERTEX) != 0
         ids[handles] = self.new_vertices[ids[handles] & ~np.uint32(NEW_VERTEX)]
         return ids
@@ -60,6 +73,7 @@ class EditBatch:
     """Collects edits in order. Nothing is sent; the methods check shapes and types only."""
 
     def __init__(self) -> None:
+        self._number = next(_batch_numbers) & _NUMBER_MASK
         self._edits: list[edits_pb2.Edit] = []
         self._num_new_vertices = 0
         self._adds_vertices: list[int] = []
@@ -76,24 +90,24 @@ class EditBatch:
 
         Returns
         -------
-        uint32[n]
-            Handles: they serve as vertex ids in later edits of this batch. `EditResult.resolve` turns
-            them into ids.
+        int64[n]
+            Handles: they serve as vertex ids in later edits of this batch, and of no other: those refuse them
+            with `InvalidArgumentError` FOREIGN_HANDLE. `EditResult.resolve` turns them into ids.
         """
         points = as_points(positions)
-        first = NEW_VERTEX + self._num_new_vertices
+        first = self._number << 32 | NEW_VERTEX + self._num_new_vertices
         self._adds_vertices.append(len(self._edits))
         self._num_new_vertices += len(points)
         self._append(add_vertices=edits_pb2.AddVertices(positions=f64_bytes(points)))
-        return np.arange(first, first + len(points), dtype=np.uint32)
+        return np.arange(first, first + len(points), dtype=np.int64)
 
     def remove_vertices(self, ids: ArrayLike) -> int:
         """Removes vertices (uint32[n]) that have no incident edges any more; returns the edit's index."""
-        return self._append(remove_vertices=edits_pb2.RemoveVertices(ids=u32_bytes(as_ids(ids))))
+        return self._append(remove_vertices=edits_pb2.RemoveVertices(ids=u32_bytes(as_ids(self._wire(ids)))))
 
     def move_vertices(self, ids: ArrayLike, positions: ArrayLike) -> int:
         """Moves vertices (uint32[n]) to positions (float[n, 3]); returns the edit's index."""
-        slots, points = as_ids(ids), as_points(positions)
+        slots, points = as_ids(self._wire(ids)), as_points(positions)
         _check_same_length("positions", len(points), len(slots))
         move = edits_pb2.MoveVertices(ids=u32_bytes(slots), positions=f64_bytes(points))
         return self._append(move_vertices=move)
@@ -114,7 +128,7 @@ class EditBatch:
             The edit's index: ``tx.result.new_ids[index]`` are the ids of the elements.
         """
         of_type = as_element_type(element_type)
-        rows = as_id_rows(vertices, of_type.num_vertices, f"vertices of {of_type} elements")
+        rows = as_id_rows(self._wire(vertices), of_type.num_vertices, f"vertices of {of_type} elements")
         block = types_pb2.ElementBlock(type=int(of_type), vertices=u32_bytes(rows))
         return self._append(add_elements=block)
 
@@ -139,7 +153,7 @@ class EditBatch:
         values : float[n], int[n], float[n, components] or int[n, components]
             Must have the column's type: float64 (single precision is widened) or int32.
         """
-        slots, rows = as_ids(ids), as_values(values, name)
+        slots, rows = as_ids(self._wire(ids)), as_values(values, name)
         _check_same_length("values", len(rows), len(slots))
         spec = make_spec(name, as_kind(kind), rows.dtype, rows.shape[1])
         message = types_pb2.AttributeValues(spec=spec, ids=u32_bytes(slots), values=values_bytes(rows))
@@ -159,7 +173,11 @@ class EditBatch:
             checksum=checksum_from_proto(reply.checksum),
             counts=counts_from_proto(reply.counts),
             warnings=tuple(warning_from_proto(w) for w in reply.warnings),
+            batch_number=self._number,
         )
+
+    def _wire(self, vertices: ArrayLike) -> ArrayLike:
+        return _to_wire(vertices, self._number)
 
     def _append(self, **kind: Any) -> int:
         self._edits.append(edits_pb2.Edit(**kind))
@@ -213,6 +231,26 @@ class Transaction(EditBatch):
     def _check_open(self) -> None:
         if self._ended:
             raise RuntimeError("the batch has ended with its with block: begin another with session.edit()")
+
+
+def _to_wire(vertices: ArrayLike, batch_number: int) -> Any:
+    """`vertices` with handles as they are on the wire; what holds none is left to be checked as it is."""
+    array = as_integers(vertices)
+    if array is None:
+        return vertices
+    handles = array > _WIRE_MASK
+    if not handles.any():
+        return array
+    foreign = array[handles] >> 32 != batch_number
+    if foreign.any():
+        index = int(np.flatnonzero(handles)[np.flatnonzero(foreign)[0]])
+        raise InvalidArgumentError(
+            "a vertex handle of another batch, or no id at all: `EditResult.resolve` of the batch that gave it out "
+            "turns it into an id",
+            reason="FOREIGN_HANDLE",
+            metadata={"index": str(index)},
+        )
+    return np.where(handles, array & _WIRE_MASK, array)
 
 
 def _check_same_length(what: str, length: int, wanted: int) -> None:

@@ -36,8 +36,10 @@ class EditStream:
         method: Callable[..., Any],
         make_request: Callable[[EditBatch], edits_pb2.ApplyEditsRequest],
         window: int,
+        check_size: Callable[[Any], None],
     ) -> None:
         self._make_request = make_request
+        self._check_size = check_size
         self._requests: queue.SimpleQueue[edits_pb2.StreamEditsRequest | None] = queue.SimpleQueue()
         self._pending: deque[_Pending] = deque()
         self._room = threading.Semaphore(window)
@@ -58,10 +60,14 @@ class EditStream:
         self.close()
 
     def submit(self, batch: EditBatch) -> Future[EditResult]:
-        """Sends a batch; its future holds the result or the error. Waits while the window is full."""
+        """Sends a batch; its future holds the result or the error. Waits while the window is full.
+
+        Raises `ResourceExhaustedError` LIMIT_EXCEEDED for a batch so large that it would end the stream.
+        """
         future: Future[EditResult] = Future()
         future.set_running_or_notify_cancel()  # sent is sent
         request = edits_pb2.StreamEditsRequest(batch=self._make_request(batch))
+        self._check_size(request)
         self._room.acquire()
         with self._lock:
             if self._broken is not None:

@@ -22,8 +22,8 @@ Subscribe = Callable[[subscriptions_pb2.SubscribeRequest], Any]
 class Sink(Protocol):
     """What a follower fills. All methods are called by the follower's thread."""
 
-    def resume_at(self) -> int:
-        """Revision to follow from."""
+    def resume_at(self) -> tuple[int, str]:
+        """Revision to follow from, and the uid of the session that it is of; empty when that is not known."""
 
     def received(self, message: subscriptions_pb2.SubscribeResponse) -> None:
         """A message has arrived: for statistics."""
@@ -99,7 +99,7 @@ class Follower:
 
     def _follow(self, backoff: Backoff) -> None:
         """Reads one stream."""
-        self._request.from_revision = self._sink.resume_at()
+        self._request.from_revision, self._request.session_uid = self._sink.resume_at()
         with self._condition:
             if self._closed:
                 return
@@ -122,7 +122,8 @@ class Follower:
             return self._closed
 
     def _recover(self, error: DynmeshError, backoff: Backoff) -> None:
-        if error.reason == "REVISION_IN_FUTURE":  # the server has lost what the sink has seen
+        # Another session has the name now, or (with a server that tells no uids) the server has lost revisions.
+        if error.reason in ("SESSION_RECREATED", "REVISION_IN_FUTURE"):
             self._start_over(error)
         elif isinstance(error, UnavailableError):
             _log.info("event=reconnect session=%s cause=%s", self._request.session, error)

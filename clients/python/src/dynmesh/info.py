@@ -66,6 +66,8 @@ class SessionInfo:
     counts, estimated_counts, boundary_counts, element_counts : Counts
         Live entities; what Euler's formula estimates for them; those on the boundary; those that users
         inserted (wire edges, dangling faces, cells).
+    uid : str
+        Tells this session from an earlier or later one of the same name.
     euler_characteristic : int
         V - E + F - C.
     bounds : float64[2, 3] or None
@@ -73,6 +75,7 @@ class SessionInfo:
     """
 
     name: str
+    uid: str
     revision: int
     etag: str
     duplicates: str  # "keep" or "refuse"
@@ -93,6 +96,7 @@ class SessionInfo:
         """The same in the types of JSON; checksums are hexadecimal strings."""
         return {
             "name": self.name,
+            "uid": self.uid,
             "revision": self.revision,
             "etag": self.etag,
             "duplicates": self.duplicates,
@@ -132,6 +136,7 @@ def info_from_proto(message: sessions_pb2.Session) -> SessionInfo:
     refuses = message.settings.duplicate_policy == sessions_pb2.DUPLICATE_POLICY_REFUSE
     return SessionInfo(
         name=message.name,
+        uid=message.uid,
         revision=message.revision,
         etag=message.etag,
         duplicates="refuse" if refuses else "keep",

@@ -64,9 +64,10 @@ class Mirror:
     ...         points = mirror.positions[mirror.elements("cell").vertices[7]]
 
     What can be read is always a whole revision: chunks of a longer answer are held back until it is
-    complete. Each state is compared with the session's checksum. A copy that differs is thrown away and
-    fetched again, once; if that one differs too the mirror ends with a `MirrorError`. A broken connection is
-    taken up again from the last revision, for as long as the mirror is open.
+    complete. Each state is compared with the session's checksum, which covers vertices and elements, not
+    attributes. A copy that differs is thrown away and fetched again, once; if that one differs too the mirror
+    ends with a `MirrorError`. A broken connection is taken up again from the last revision, for as long as the
+    mirror is open; if another session has the name by then, its copy is fetched from the beginning.
 
     Thread safety: everything may be called from any thread. Arrays are views that stay as they are only
     while `lock` is held; `snapshot` copies.
@@ -95,6 +96,7 @@ class Mirror:
         self._last: Update | None = None
         self._pending_bytes = 0
         self._synced = True
+        self._confirmed = state.revision == 0  # else the server has yet to say that the session is still that one
         self._starting_over = False
         self._closed = False
         self._error: DynmeshError | None = None
@@ -227,7 +229,7 @@ class Mirror:
             return self._state
 
     def _is_at(self, revision: int) -> bool:
-        return self._synced and self._state.revision >= revision
+        return self._synced and self._confirmed and self._state.revision >= revision
 
     def _ended(self) -> bool:
         return self._closed or self._error is not None
@@ -245,9 +247,9 @@ class _MirrorSink:
     def __init__(self, mirror: Mirror) -> None:
         self._mirror = mirror
 
-    def resume_at(self) -> int:
+    def resume_at(self) -> tuple[int, str]:
         self._mirror._pending_bytes = 0
-        return self._mirror._state.revision
+        return self._mirror._state.revision, self._mirror._state.session_uid
 
     def received(self, message: subscriptions_pb2.SubscribeResponse) -> None:
         with self._mirror._condition:
@@ -259,6 +261,7 @@ class _MirrorSink:
         with mirror._condition:
             from_revision = mirror._state.revision
             self._apply(deltas)
+            mirror._state.session_uid = message.session_uid
             latency_s = max(time.time() - message.commit_time_us * 1e-6, 0.0)
             update = Update(from_revision, message.revision, deltas, mirror._pending_bytes, latency_s)
             mirror.stats.latencies_s.append(latency_s)
@@ -290,4 +293,5 @@ class _MirrorSink:
         self._mirror._synced = False  # until all are applied and verified
         for delta in deltas:
             self._mirror._state.apply(delta)
-        self._mirror._synced, self._mirror._starting_over = True, False
+        self._mirror._synced = self._mirror._confirmed = True
+        self._mirror._starting_over = False

@@ -26,12 +26,15 @@ class MirrorState:
     ----------
     revision : int
         Of the last consistent delta.
+    session_uid : str
+        Of the session that `revision` is of (`SessionInfo.uid`); empty before the first delta.
     quantized : bool
         Whether positions lie on a grid: then only the topology can be verified.
     """
 
     def __init__(self) -> None:
         self.revision = 0
+        self.session_uid = ""
         self.quantized = False
         self.vertices = VertexTable()
         self.elements = {kind: ElementTable() for kind in ELEMENT_KINDS}

@@ -10,6 +10,7 @@ import grpc
 from numpy.typing import ArrayLike
 
 from ._calls import Caller
+from .arrays import as_int64
 from .delta import HAS_NATIVE
 from .edit import EditBatch, EditResult, Transaction
 from .edit_stream import EditStream
@@ -25,6 +26,8 @@ from .v1 import edits_pb2, edits_pb2_grpc, sessions_pb2, subscriptions_pb2, subs
 
 if TYPE_CHECKING:
     import meshio
+
+_MAX_INTERVAL_S = 3600
 
 _CODECS = {
     "auto": subscriptions_pb2.DELTA_CODEC_UNSPECIFIED,
@@ -160,8 +163,8 @@ class Session(SessionReader):
         request = edits_pb2.ApplyEditsRequest(
             session=self.name,
             edits=batch.edits(),
-            as_of_revision=as_of_revision,
-            if_revision=if_revision,
+            as_of_revision=as_int64(as_of_revision, "as_of_revision"),
+            if_revision=None if if_revision is None else as_int64(if_revision, "if_revision"),
             request_id=request_id or _new_request_id(),
             validate_only=validate_only,
         )
@@ -169,16 +172,17 @@ class Session(SessionReader):
 
     def edit_stream(self, *, as_of_revision: int = 0, window: int = 64) -> EditStream:
         """Pipelined edits: up to `window` batches are on their way at once."""
+        read_at = as_int64(as_of_revision, "as_of_revision")
 
         def make_request(batch: EditBatch) -> edits_pb2.ApplyEditsRequest:
             return edits_pb2.ApplyEditsRequest(
                 session=self.name,
                 edits=batch.edits(),
-                as_of_revision=as_of_revision,
+                as_of_revision=read_at,
                 request_id=_new_request_id(),
             )
 
-        return EditStream(self._edits.StreamEdits, make_request, window)
+        return EditStream(self._edits.StreamEdits, make_request, window, self._caller.check_size)
 
     # ---- Following ----
 
@@ -211,8 +215,8 @@ class Session(SessionReader):
         request = subscriptions_pb2.SubscribeRequest(
             session=self.name,
             codec=_codec(codec),
-            position_bits=position_bits,
-            min_interval_ms=round(min_interval * 1000),
+            position_bits=_int32(position_bits, "position_bits"),
+            min_interval_ms=_milliseconds(min_interval),
         )
         state = from_mirror.state() if from_mirror else MirrorState()
         return Mirror(self._subscriptions.Subscribe, request, state, on_delta)
@@ -220,6 +224,22 @@ class Session(SessionReader):
 
 def _new_request_id() -> str:
     return uuid.uuid4().hex
+
+
+def _int32(value: int, what: str) -> int:
+    if -(2**31) <= as_int64(value, what) < 2**31:
+        return int(value)
+    raise InvalidArgumentError(f"{what} is out of range: {value}", reason="BAD_ARGUMENT", metadata={"field": what})
+
+
+def _milliseconds(seconds: float) -> int:
+    if not 0 <= seconds <= _MAX_INTERVAL_S:  # NaN too
+        raise InvalidArgumentError(
+            f"min_interval is between 0 and {_MAX_INTERVAL_S} seconds, not {seconds}",
+            reason="BAD_ARGUMENT",
+            metadata={"field": "min_interval"},
+        )
+    return round(seconds * 1000)
 
 
 def _codec(name: str) -> int:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import grpc
 
 from ._calls import Caller
-from .arrays import Ids, Points
+from .arrays import Ids, Points, as_int64
 from .files import PathLike
 from .info import Counts, SessionInfo, info_from_proto
 from .kinds import KindLike, as_kind
@@ -159,7 +159,7 @@ class SessionReader:
         return snapshot
 
     def _selected(self, selection: types_pb2.Selection, as_of_revision: int) -> dict[str, Any]:
-        return {"session": self.name, "selection": selection, "as_of_revision": as_of_revision}
+        return {"session": self.name, "selection": selection, "as_of_revision": as_int64(as_of_revision, "as_of_revision")}
 
     def _replies(self, method: Any, requests: list[Any], timeout: float | None) -> Iterator[Any]:
         return chain.from_iterable(self._caller.stream(method, request, timeout) for request in requests)
