@@ -92,6 +92,10 @@ void ForEachRow(const Mesh& mesh, Relation relation, Fn fn) {
   }
 }
 
+/// Puts the neighbours of `slot` into `row`, by way of `block`, which a caller of many keeps.
+/// REQUIRES: `slot` is live in `mesh`.
+void GetNeighbors(const Mesh& mesh, Relation relation, Slot slot, RowBlock& block, std::vector<Slot>& row);
+
 /// Appends the neighbours of `slot` to `out`. REQUIRES: `slot` is live in `mesh`.
 void AppendNeighbors(const Mesh& mesh, Relation relation, Slot slot, std::vector<Slot>& out);
 

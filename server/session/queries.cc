@@ -144,8 +144,7 @@ absl::StatusOr<BoundaryAnswer> GatherBoundary(const Mesh& mesh, EntityKind kind,
   DYNMESH_RETURN_IF_ERROR(budget.ChargeSteps(boundary.size()));
   DYNMESH_RETURN_IF_ERROR(budget.ChargeBytes(boundary.size() * sizeof(Slot)));
   BoundaryAnswer answer{mesh.revision(), {}};
-  answer.ids.reserve(boundary.size());
-  boundary.ForEach([&](Slot slot) { answer.ids.push_back(slot); });
+  boundary.ListMembers(answer.ids);
   return answer;
 }
 

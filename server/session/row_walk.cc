@@ -5,11 +5,13 @@
 namespace dynmesh {
 
 absl::Status RowWalk::Walk(Slot slot, std::vector<Slot>& row) {
-  row.clear();
   const uint64_t steps = CountSteps(slot);
-  if (steps >= long_row_ && relation_.to >= relation_.from) return WalkLong(slot, row);
+  if (steps >= long_row_ && relation_.to >= relation_.from) {
+    row.clear();
+    return WalkLong(slot, row);
+  }
   DYNMESH_RETURN_IF_ERROR(budget_.ChargeSteps(steps));
-  AppendNeighbors(mesh_, relation_, slot, row);
+  GetNeighbors(mesh_, relation_, slot, block_, row);
   // Of the last lists on the way only the entries are known, at most a dozen times each.
   return budget_.ChargeSteps(row.size());
 }

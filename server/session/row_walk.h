@@ -15,7 +15,7 @@ namespace dynmesh {
 ///
 /// A row may take far more steps than it has entries: of an edge with 100,000 dangling faces each is asked for
 /// its cells, and there are none. So the lengths of the lists on the way are added up and charged first. A short
-/// row is then gathered by AppendNeighbors; a long one here, list by list, with the neighbours marked in a bit
+/// row is then gathered by GetNeighbors; a long one here, list by list, with the neighbours marked in a bit
 /// set: so it can stop on the way and needs no memory for those that it meets twice.
 /// Thread safety: that of std::vector.
 class RowWalk {
@@ -47,6 +47,7 @@ class RowWalk {
   QueryBudget& budget_;
   const uint64_t long_row_;
   BitSet marked_;  ///< empty between rows
+  RowBlock block_;
 };
 
 }  // namespace dynmesh

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "core/mesh/bulk_build.h"
 #include "core/mesh/mesh.h"
 #include "server/session/importer/staged_mesh.h"
 #include "server/session/mesh_warnings.h"
@@ -23,34 +24,42 @@ class ImportMonitor {
 
 /// Turns what an import has staged into a mesh at revision 1, and frees it on the way.
 ///
-/// Vertices first, then elements by ascending dimension: so no derived entity takes a slot before the
-/// elements of its kind, and element i of a kind gets slot i.
+/// Vertices first, then elements by ascending dimension, in bulk: element i of a kind gets slot i.
 class MeshBuilder {
  public:
   MeshBuilder(const MeshOptions& options, const Limits& limits, ImportMonitor& monitor)
-      : limits_(limits), monitor_(monitor), mesh_(options) {}
+      : mesh_options_(options), limits_(limits), monitor_(monitor) {}
 
-  /// Errors: INVALID_ARGUMENT UNKNOWN_ENTITY (a vertex id out of range; metadata index, ids), those of
-  /// Mesh::AddElement with metadata index; RESOURCE_EXHAUSTED LIMIT_EXCEEDED; CANCELLED.
+  /// Errors: INVALID_ARGUMENT UNKNOWN_ENTITY (a vertex id out of range; metadata index, ids), DUPLICATE_ELEMENT (if so
+  /// opted; metadata index); RESOURCE_EXHAUSTED LIMIT_EXCEEDED; CANCELLED.
   absl::StatusOr<Mesh> Build(StagedMesh staged);
 
   /// Of the mesh that Build made.
   const std::vector<MeshWarning>& warnings() const { return warnings_.warnings(); }
 
  private:
-  void Reserve(const StagedMesh& staged);
-  absl::Status AddVertices(ByteQueue& positions);
-  absl::Status AddRun(StagedRun& run);
-  absl::Status AddElement(ElementType type, const char* ids, uint64_t index);
-  absl::Status AddColumn(StagedColumn& column);
-  absl::Status Tick();
+  /// `count` elements of a kind that follow each other in the import.
+  struct RunPlace {
+    EntityKind kind;
+    uint64_t count;
+    uint64_t first_index;
+  };
 
+  absl::Status AddVertices(ByteQueue& positions, BulkBuilder& builder);
+  absl::Status AddRun(StagedRun& run, BulkBuilder& builder);
+  absl::Status AddColumn(StagedColumn& column, Mesh& mesh);
+  absl::Status OnProgress(uint64_t done, uint64_t total);
+  absl::Status CheckCancelled() const;
+  absl::Status CheckMemory(uint64_t bytes) const;
+  /// A "position" among the elements of a kind, as "index" among all elements of the import.
+  absl::Status WithImportIndex(const absl::Status& status) const;
+
+  const MeshOptions mesh_options_;
   const Limits limits_;
   ImportMonitor& monitor_;
-  Mesh mesh_;
   WarningCollector warnings_;
+  std::vector<RunPlace> places_;
   uint64_t num_vertices_ = 0;
-  uint64_t done_ = 0;
   uint64_t total_ = 0;
 };
 
