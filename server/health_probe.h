@@ -9,8 +9,8 @@
 
 namespace dynmesh {
 
-/// Where a health check of the own machine reaches a daemon with these flags: its first address, by loopback where it
-/// listens on all, else its unix socket; empty when there is neither, or the port is not known.
+/// Where a health check of the own machine reaches a daemon with these flags: its first address, by loopback
+/// where it listens on all, else its unix socket; empty when there is neither, or the port is not known.
 std::string ProbeTarget(const std::vector<std::string>& listen, const std::string& unix_socket);
 
 /// Asks the server at `target` by grpc.health.v1.Health/Check; OK when it answers SERVING within `timeout`.

@@ -39,12 +39,15 @@ ABSL_FLAG(std::string, log_level, "info", "trace, debug, info, warn, error or of
 ABSL_FLAG(absl::Duration, drain_timeout, absl::Seconds(10),
           "How long calls under way may go on after SIGTERM or SIGINT; the daemon ends at most 5 s later");
 ABSL_FLAG(bool, exit_with_parent, false, "Drain and exit when the process that started this one ends");
-ABSL_FLAG(std::string, health_check, "",
-          "Do not serve: ask the server at this gRPC target for its health, and exit with 0 or 1. \"self\": where "
-          "one with the other flags and the same environment serves");
-ABSL_FLAG(int32_t, quick_threads, 0, "Threads for edits and small queries; 0: four for each processor, at least 8");
-ABSL_FLAG(int32_t, heavy_threads, 0,
-          "Threads for imports, exports, validation and large queries; 0: four more than max_concurrent_imports");
+ABSL_FLAG(
+    std::string, health_check, "",
+    "Do not serve: ask the server at this gRPC target for its health, and exit with 0 or 1. \"self\": where "
+    "one with the other flags and the same environment serves");
+ABSL_FLAG(int32_t, quick_threads, 0,
+          "Threads for edits and small queries; 0: four for each processor, at least 8");
+ABSL_FLAG(
+    int32_t, heavy_threads, 0,
+    "Threads for imports, exports, validation and large queries; 0: four more than max_concurrent_imports");
 
 ABSL_FLAG(uint32_t, max_sessions, dynmesh::Limits().max_sessions, "Sessions");
 ABSL_FLAG(uint32_t, max_vertices, dynmesh::Limits().max_vertices, "Vertices of a session");

@@ -81,12 +81,14 @@ class MeshValidator {
   }
 
   void CheckJoins(EntityId user, EdgeId e, VertexId a, VertexId b) {
-    if (!mesh_.IsLive(e)) return Report(EntityKindName(user.kind), " ", user.slot, " has dead edge ", e.slot());
+    if (!mesh_.IsLive(e))
+      return Report(EntityKindName(user.kind), " ", user.slot, " has dead edge ", e.slot());
     if (PairKey(e) != std::array<VertexId, 2>{std::min(a, b), std::max(a, b)}) {
-      Report("edge ", e.slot(), " of ", EntityKindName(user.kind), " ", user.slot, " does not join ", a.slot(),
-             " and ", b.slot());
+      Report("edge ", e.slot(), " of ", EntityKindName(user.kind), " ", user.slot, " does not join ",
+             a.slot(), " and ", b.slot());
     }
-    if (mesh_.IsDuplicate(e)) Report(EntityKindName(user.kind), " ", user.slot, " uses duplicate edge ", e.slot());
+    if (mesh_.IsDuplicate(e))
+      Report(EntityKindName(user.kind), " ", user.slot, " uses duplicate edge ", e.slot());
   }
 
   void CheckCells() {
@@ -127,7 +129,8 @@ class MeshValidator {
       const OrientedFace oriented = mesh_.Faces(c)[i];
       const auto edges = mesh_.Edges(oriented.face());
       for (int k = 0; k < shape.faces[i].size; ++k) {
-        if (edges[oriented.code().StoredEdge(k, edges.size())] == mesh_.Edge(c, shape.faces[i].edges[k])) continue;
+        if (edges[oriented.code().StoredEdge(k, edges.size())] == mesh_.Edge(c, shape.faces[i].edges[k]))
+          continue;
         Report("cell ", c.slot(), " sees different edges through face ", oriented.face().slot());
       }
     }
@@ -157,7 +160,8 @@ class MeshValidator {
                                      [this](FaceId f) { return mesh_.IncidentCells(f); });
   }
 
-  /// Users of each lower entity, ascending, as compressed sparse rows: a counting sort of the downward references.
+  /// Users of each lower entity, ascending, as compressed sparse rows: a counting sort of the downward
+  /// references.
   template <typename UpperId, typename PartsOf>
   CsrTable CountUses(EntityKind lower, EntityKind upper, PartsOf parts_of) const {
     CsrTable uses;
@@ -191,7 +195,8 @@ class MeshValidator {
   /// Both ascend.
   void ReportDifferences(EntityId lower, absl::Span<const Slot> expected, absl::Span<const Slot> listed) {
     for (size_t e = 0, l = 0; e < expected.size() || l < listed.size();) {
-      const Slot user = std::min(e < expected.size() ? expected[e] : kNoSlot, l < listed.size() ? listed[l] : kNoSlot);
+      const Slot user =
+          std::min(e < expected.size() ? expected[e] : kNoSlot, l < listed.size() ? listed[l] : kNoSlot);
       size_t times_expected = 0;
       size_t times_listed = 0;
       for (; e < expected.size() && expected[e] == user; ++e) ++times_expected;
@@ -234,7 +239,8 @@ class MeshValidator {
     });
     if (mesh_.hub_faces_.size() < expected) Report("the index of hub faces is too small");
     for (const auto& [key, f] : mesh_.hub_faces_) {
-      if (!mesh_.IsLive(f) || CanonicalCycle(mesh_.Vertices(f)) != key) Report("hub index holds wrong face ", f.slot());
+      if (!mesh_.IsLive(f) || CanonicalCycle(mesh_.Vertices(f)) != key)
+        Report("hub index holds wrong face ", f.slot());
     }
   }
 
@@ -245,7 +251,8 @@ class MeshValidator {
 
   using KeyedSlot = std::pair<CycleKey, Slot>;
 
-  /// Edges or faces with their cycles, sorted by both: by the smallest vertex through buckets, which are small.
+  /// Edges or faces with their cycles, sorted by both: by the smallest vertex through buckets, which are
+  /// small.
   std::vector<KeyedSlot> SortByCycle(EntityKind kind) const {
     std::vector<uint32_t> begins(size_t{mesh_.slots(EntityKind::kVertex).limit()} + 2, 0);
     std::vector<KeyedSlot> unsorted;
@@ -258,7 +265,8 @@ class MeshValidator {
     std::vector<KeyedSlot> sorted(unsorted.size());
     for (const KeyedSlot& keyed : unsorted) sorted[begins[keyed.first[0].slot() + 1]++] = keyed;
     for (size_t v = 0; v + 1 < begins.size(); ++v) {
-      if (begins[v + 1] - begins[v] > 1) std::sort(sorted.begin() + begins[v], sorted.begin() + begins[v + 1]);
+      if (begins[v + 1] - begins[v] > 1)
+        std::sort(sorted.begin() + begins[v], sorted.begin() + begins[v + 1]);
     }
     return sorted;
   }
@@ -294,8 +302,8 @@ class MeshValidator {
     if (primaries == 0) Report("duplicate ", EntityKindName(kind), " ", duplicates[0], " without primary");
     const auto& index = mesh_.duplicates_[Dimension(kind)];
     const auto it = index.find(sharing[0].first);
-    const bool indexed = it != index.end() && std::equal(duplicates.begin(), duplicates.end(), it->second.begin(),
-                                                         it->second.end());
+    const bool indexed = it != index.end() && std::equal(duplicates.begin(), duplicates.end(),
+                                                         it->second.begin(), it->second.end());
     if (!indexed) Report("duplicate ", EntityKindName(kind), " ", duplicates[0], " is not indexed");
     return true;
   }
@@ -352,8 +360,10 @@ class MeshValidator {
         elements += mesh_.IsElement({kind, slot});
         CheckStamps({kind, slot});
       });
-      if (!mesh_.slots(kind).IsSound()) Report("slots of kind ", EntityKindName(kind), " are both live and free");
-      if (!mesh_.changed(kind).IsSound()) Report("a page of kind ", EntityKindName(kind), " hides a later stamp");
+      if (!mesh_.slots(kind).IsSound())
+        Report("slots of kind ", EntityKindName(kind), " are both live and free");
+      if (!mesh_.changed(kind).IsSound())
+        Report("a page of kind ", EntityKindName(kind), " hides a later stamp");
       if (live != mesh_.NumLive(kind)) Report("wrong count of live entities, kind ", EntityKindName(kind));
       if (elements != mesh_.NumElements(kind)) Report("wrong count of elements, kind ", EntityKindName(kind));
     }
@@ -407,7 +417,8 @@ class MeshValidator {
     const bool has_changed = id.kind == EntityKind::kVertex || mesh_.IsElement(id);
     if (born < 1 || born > mesh_.revision() + 1 || (has_changed && changed < born) ||
         changed > mesh_.revision() + 1) {
-      Report(EntityKindName(id.kind), " ", id.slot, " has impossible stamps: born ", born, ", changed ", changed);
+      Report(EntityKindName(id.kind), " ", id.slot, " has impossible stamps: born ", born, ", changed ",
+             changed);
     }
   }
 
@@ -420,7 +431,8 @@ class MeshValidator {
     for (EntityKind kind : {EntityKind::kEdge, EntityKind::kFace, EntityKind::kCell}) {
       mesh_.slots(kind).live().ForEach([&](Slot slot) {
         const EntityId id(kind, slot);
-        if (mesh_.IsElement(id)) expected.topology += Checksum::ElementTerm(mesh_.Type(id), slot, mesh_.VerticesOf(id));
+        if (mesh_.IsElement(id))
+          expected.topology += Checksum::ElementTerm(mesh_.Type(id), slot, mesh_.VerticesOf(id));
       });
     }
     if (expected.topology != mesh_.checksum().topology) Report("wrong topology checksum");

@@ -22,9 +22,9 @@ struct ValidateOptions {
 ///
 /// Checks liveness of everything referred to, both directions of every stored relation, orientation codes,
 /// uniqueness of primaries, the indices of hubs and duplicates, element flags and counts, boundary bits and
-/// counters, slots, stamps, and both checksums. Not: the rooms of the pools, which only AddressSanitizer sees.
-/// Cost: linear in the mesh but for sorting the duplicates of a vertex's faces; about a microsecond a tetrahedron,
-/// and 50 bytes meanwhile. For tests and worried operators.
+/// counters, slots, stamps, and both checksums. Not: the rooms of the pools, which only AddressSanitizer
+/// sees. Cost: linear in the mesh but for sorting the duplicates of a vertex's faces; about a microsecond a
+/// tetrahedron, and 50 bytes meanwhile. For tests and worried operators.
 std::vector<std::string> Validate(const Mesh& mesh, const ValidateOptions& options = {});
 
 }  // namespace dynmesh

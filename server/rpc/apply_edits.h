@@ -9,7 +9,8 @@
 
 namespace dynmesh {
 
-/// One batch: what ApplyEdits answers, and StreamEdits in band. REQUIRES: it is the caller's turn at `session`.
+/// One batch: what ApplyEdits answers, and StreamEdits in band. REQUIRES: it is the caller's turn at
+/// `session`.
 absl::Status ApplyEdits(Session& session, const v1::ApplyEditsRequest& request,
                         v1::ApplyEditsResponse* response);
 

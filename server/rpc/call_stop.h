@@ -9,8 +9,8 @@
 
 namespace dynmesh {
 
-/// Stops when the call was cancelled: by its peer, or because the time to drain is over. And when its deadline
-/// has passed.
+/// Stops when the call was cancelled: by its peer, or because the time to drain is over. And when its
+/// deadline has passed.
 class CallStop final : public StopSignal {
  public:
   /// REQUIRES: `context` outlives this.

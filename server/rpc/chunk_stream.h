@@ -24,7 +24,8 @@ namespace dynmesh {
 ///     return (new GetBoundaryReactor(...))->Start(request->session(), request->ByteSizeLong());
 ///
 /// Gathering ends early when the call is cancelled or its deadline passes. One write is in flight at a time;
-/// chunks that were sent are freed, and what waits to be sent counts against max_answer_bytes. Deletes itself.
+/// chunks that were sent are freed, and what waits to be sent counts against max_answer_bytes. Deletes
+/// itself.
 template <typename Response>
 class ChunkStreamReactor : public grpc::ServerWriteReactor<Response> {
  public:

@@ -64,7 +64,8 @@ void ImportReactor::OnWatch() {
     MutexLock lock(&mu_);
     phase = phase_;
     due = std::min(waiting_since_, now) + timeout;
-    if (phase == Phase::kReceiving && due <= now) phase_ = Phase::kFinishing;  // a read that ends now is ignored
+    if (phase == Phase::kReceiving && due <= now)
+      phase_ = Phase::kFinishing;  // a read that ends now is ignored
   }
   if (phase == Phase::kBuilding) return;
   if (due > now || phase == Phase::kReceiving) WatchUntil(due > now ? due : now + timeout);

@@ -24,8 +24,9 @@ namespace dynmesh {
 ///
 /// The announcement has to be written before the build begins: a read that ends looks the same whether the
 /// peer is done or gone, but to one who is gone nothing can be written. So a cut stream is never taken for a
-/// short mesh. A peer that sends nothing for import_idle_timeout, or does not read what it is told for as long,
-/// is not waited for: it would keep others from importing. Progress is written when no write is in flight, and left out else. Deletes itself.
+/// short mesh. A peer that sends nothing for import_idle_timeout, or does not read what it is told for as
+/// long, is not waited for: it would keep others from importing. Progress is written when no write is in
+/// flight, and left out else. Deletes itself.
 class ImportReactor final : public grpc::ServerBidiReactor<v1::ImportMeshRequest, v1::ImportMeshResponse>,
                             public ImportMonitor {
  public:

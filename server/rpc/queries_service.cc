@@ -164,22 +164,26 @@ class QueriesService final : public v1::QueryService::CallbackService {
 
   grpc::ServerWriteReactor<v1::GetNeighborsResponse>* GetNeighbors(
       grpc::CallbackServerContext* context, const v1::GetNeighborsRequest* request) override {
-    return (new GetNeighborsReactor(services_, context, request))->Start(request->session(), request->ByteSizeLong());
+    return (new GetNeighborsReactor(services_, context, request))
+        ->Start(request->session(), request->ByteSizeLong());
   }
 
   grpc::ServerWriteReactor<v1::GetEntitiesResponse>* GetEntities(
       grpc::CallbackServerContext* context, const v1::GetEntitiesRequest* request) override {
-    return (new GetEntitiesReactor(services_, context, request))->Start(request->session(), request->ByteSizeLong());
+    return (new GetEntitiesReactor(services_, context, request))
+        ->Start(request->session(), request->ByteSizeLong());
   }
 
   grpc::ServerWriteReactor<v1::GetBoundaryResponse>* GetBoundary(
       grpc::CallbackServerContext* context, const v1::GetBoundaryRequest* request) override {
-    return (new GetBoundaryReactor(services_, context, request))->Start(request->session(), request->ByteSizeLong());
+    return (new GetBoundaryReactor(services_, context, request))
+        ->Start(request->session(), request->ByteSizeLong());
   }
 
   grpc::ServerWriteReactor<v1::GetBoundarySurfaceResponse>* GetBoundarySurface(
       grpc::CallbackServerContext* context, const v1::GetBoundarySurfaceRequest* request) override {
-    return (new GetBoundarySurfaceReactor(services_, context, request))->Start(request->session(), request->ByteSizeLong());
+    return (new GetBoundarySurfaceReactor(services_, context, request))
+        ->Start(request->session(), request->ByteSizeLong());
   }
 
  private:

@@ -21,9 +21,9 @@ struct SessionWork {
 /// From so many rows on a query is heavy.
 inline constexpr uint64_t kManyRows = 20'000;
 
-/// Runs task(grant) when it is its turn at `session`. Light work waits without a thread. Heavy work waits with
-/// one of the heavy threads, so that it does not keep others from the session while it waits for a thread.
-/// Errors: those of Executor::Admit; the task is destroyed then.
+/// Runs task(grant) when it is its turn at `session`. Light work waits without a thread. Heavy work waits
+/// with one of the heavy threads, so that it does not keep others from the session while it waits for a
+/// thread. Errors: those of Executor::Admit; the task is destroyed then.
 template <typename Task>
 absl::Status PostWork(const ServiceContext& services, const SessionPtr& session, const SessionWork& work,
                       Task task) {
@@ -31,7 +31,9 @@ absl::Status PostWork(const ServiceContext& services, const SessionPtr& session,
     return session->access().TryPost(work.mode, services.quick(), work.request_bytes, std::move(task));
   }
   return services.heavy().TryPost(
-      [session, mode = work.mode, task = std::move(task)]() mutable { task(session->access().Acquire(mode)); },
+      [session, mode = work.mode, task = std::move(task)]() mutable {
+        task(session->access().Acquire(mode));
+      },
       work.request_bytes);
 }
 

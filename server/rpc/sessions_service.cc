@@ -41,7 +41,8 @@ absl::Status GetSession(const Session& session, v1::GetSessionResponse* response
   return absl::OkStatus();
 }
 
-/// What is to be told of the sessions is scanned once for each revision: for many entities that takes a while.
+/// What is to be told of the sessions is scanned once for each revision: for many entities that takes a
+/// while.
 bool IsLarge(const Session& session) {
   uint64_t entities = 0;
   for (EntityKind kind : kEntityKinds) entities += session.num_live(kind);
@@ -201,12 +202,11 @@ class SessionsService final : public v1::SessionService::CallbackService {
   grpc::ServerUnaryReactor* ValidateSession(grpc::CallbackServerContext* context,
                                             const v1::ValidateSessionRequest* request,
                                             v1::ValidateSessionResponse* response) override {
-    return RunOnSession({"ValidateSession", context, services_}, request->session(),
-                        {AccessMode::kRead, /*heavy=*/true},
-                        [context, response](const SessionPtr& session, AccessGrant grant) {
-                          return dynmesh::ValidateSession(*session, CallStop(context), std::move(grant),
-                                                          response);
-                        });
+    return RunOnSession(
+        {"ValidateSession", context, services_}, request->session(), {AccessMode::kRead, /*heavy=*/true},
+        [context, response](const SessionPtr& session, AccessGrant grant) {
+          return dynmesh::ValidateSession(*session, CallStop(context), std::move(grant), response);
+        });
   }
 
   grpc::ServerBidiReactor<v1::ImportMeshRequest, v1::ImportMeshResponse>* ImportMesh(
@@ -216,8 +216,7 @@ class SessionsService final : public v1::SessionService::CallbackService {
 
   grpc::ServerWriteReactor<v1::ExportMeshResponse>* ExportMesh(
       grpc::CallbackServerContext* context, const v1::ExportMeshRequest* request) override {
-    return (new ExportMeshReactor(services_, context))
-        ->Start(request->session(), request->ByteSizeLong());
+    return (new ExportMeshReactor(services_, context))->Start(request->session(), request->ByteSizeLong());
   }
 
  private:

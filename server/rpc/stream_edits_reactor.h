@@ -18,12 +18,12 @@ namespace dynmesh {
 ///
 ///     read ──> requests_ ──> apply (its turn at the session) ──> responses_ ──> write
 ///
-/// Batches wait for their session without a thread, and one after the other for the same session share a turn.
-/// What waits counts against the daemon's max_queued_bytes; a batch that found no room there is refused.
-/// Batches are applied and answered in order; a refused one is answered in band. A peer that does not read
-/// its answers is not read from either. The stream ends OK when the peer has half-closed and has all answers,
-/// and with UNAVAILABLE SHUTTING_DOWN, after the answers to what was read, when the server drains. Deletes
-/// itself.
+/// Batches wait for their session without a thread, and one after the other for the same session share a
+/// turn. What waits counts against the daemon's max_queued_bytes; a batch that found no room there is
+/// refused. Batches are applied and answered in order; a refused one is answered in band. A peer that does
+/// not read its answers is not read from either. The stream ends OK when the peer has half-closed and has all
+/// answers, and with UNAVAILABLE SHUTTING_DOWN, after the answers to what was read, when the server drains.
+/// Deletes itself.
 class StreamEditsReactor final
     : public grpc::ServerBidiReactor<v1::StreamEditsRequest, v1::StreamEditsResponse>,
       public Drainable {

@@ -23,9 +23,8 @@ absl::Status AccessQueue::TryPost(AccessMode mode, Executor& executor, size_t by
 
 void AccessQueue::Post(AccessMode mode, Executor& executor, Task task) {
   Enqueue({mode, [&executor, task = std::move(task)](AccessGrant grant) mutable {
-             executor.Post([task = std::move(task), grant = std::move(grant)]() mutable {
-               task(std::move(grant));
-             });
+             executor.Post(
+                 [task = std::move(task), grant = std::move(grant)]() mutable { task(std::move(grant)); });
            }});
 }
 

@@ -49,9 +49,9 @@ class AccessGrant {
 ///     session.access().TryPost(AccessMode::kWrite, executor, request_bytes,
 ///                              [](AccessGrant grant) { ... session.Apply(...) ... });
 ///
-/// The session's lock stays what guards its data; among holders of grants it is free, so taking it never takes
-/// long. A holder must not wait for another grant of the same session.
-/// Thread safety: full. Always owned by a shared_ptr.
+/// The session's lock stays what guards its data; among holders of grants it is free, so taking it never
+/// takes long. A holder must not wait for another grant of the same session. Thread safety: full. Always
+/// owned by a shared_ptr.
 class AccessQueue : public std::enable_shared_from_this<AccessQueue> {
  public:
   using Task = absl::AnyInvocable<void(AccessGrant)>;

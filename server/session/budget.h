@@ -44,8 +44,7 @@ class Lease {
  public:
   Lease() = default;
   explicit Lease(std::shared_ptr<Budget> budget) : budget_(std::move(budget)) {}
-  Lease(Lease&& other) noexcept
-      : budget_(std::move(other.budget_)), held_(std::exchange(other.held_, 0)) {}
+  Lease(Lease&& other) noexcept : budget_(std::move(other.budget_)), held_(std::exchange(other.held_, 0)) {}
   Lease& operator=(Lease&& other) noexcept {
     std::swap(budget_, other.budget_);
     std::swap(held_, other.held_);

@@ -19,13 +19,11 @@ namespace dynmesh {
 
 /// A fixed number of threads and a bounded queue in front of them.
 ///
-/// Reactors of gRPC never compute: they hand a call to TryPost(), which refuses when too many wait already, or
-/// when their requests hold too much memory.
-/// What an admitted call does next (the following step of a stream) goes to Post(), whose number is bounded
-/// by the calls that were admitted.
-/// A task must not wait for another task. Exceptions that escape one are logged and dropped, so a task that
-/// owes somebody an answer catches them itself (catch_exceptions.h).
-/// Thread safety: full.
+/// Reactors of gRPC never compute: they hand a call to TryPost(), which refuses when too many wait already,
+/// or when their requests hold too much memory. What an admitted call does next (the following step of a
+/// stream) goes to Post(), whose number is bounded by the calls that were admitted. A task must not wait for
+/// another task. Exceptions that escape one are logged and dropped, so a task that owes somebody an answer
+/// catches them itself (catch_exceptions.h). Thread safety: full.
 class Executor {
  public:
   using Task = absl::AnyInvocable<void()>;
@@ -49,8 +47,8 @@ class Executor {
   ~Executor() { Stop(); }
 
   /// For a task that waits elsewhere before it is posted here. `bytes` is what its request holds.
-  /// Errors: RESOURCE_EXHAUSTED LIMIT_EXCEEDED (max_queued_tasks, max_queued_bytes); UNAVAILABLE SHUTTING_DOWN
-  /// after Stop().
+  /// Errors: RESOURCE_EXHAUSTED LIMIT_EXCEEDED (max_queued_tasks, max_queued_bytes); UNAVAILABLE
+  /// SHUTTING_DOWN after Stop().
   absl::StatusOr<Ticket> Admit(size_t bytes);
 
   /// For requests that are queued elsewhere and need no place here.

@@ -36,8 +36,8 @@ struct ExportAnswer {
   std::vector<ExportChunk> chunks;
 };
 
-/// Gathered under one reader lock. Errors: those of QueryBudget; beyond max_query_bytes subscribe instead, which
-/// has no such limit.
+/// Gathered under one reader lock. Errors: those of QueryBudget; beyond max_query_bytes subscribe instead,
+/// which has no such limit.
 absl::StatusOr<ExportAnswer> ExportSession(const Session& session, const QueryTerms& terms = {});
 
 }  // namespace dynmesh

@@ -56,8 +56,8 @@ class Follower : public std::enable_shared_from_this<Follower> {
   Follower(SessionPtr session, const FollowOptions& options, DeltaSink* sink);
 
   /// Adds this to its session and starts. When it fails, the sink is never called.
-  /// Errors: INVALID_ARGUMENT BAD_ARGUMENT; ABORTED SESSION_RECREATED; OUT_OF_RANGE REVISION_IN_FUTURE; RESOURCE_EXHAUSTED
-  /// LIMIT_EXCEEDED; NOT_FOUND SESSION_DELETED; UNAVAILABLE SHUTTING_DOWN.
+  /// Errors: INVALID_ARGUMENT BAD_ARGUMENT; ABORTED SESSION_RECREATED; OUT_OF_RANGE REVISION_IN_FUTURE;
+  /// RESOURCE_EXHAUSTED LIMIT_EXCEEDED; NOT_FOUND SESSION_DELETED; UNAVAILABLE SHUTTING_DOWN.
   absl::Status Begin();
 
   /// The sink is done with the payload; not `ok`: the peer is gone.

@@ -30,7 +30,8 @@ struct Limits {
   uint64_t max_message_bytes = uint64_t{4} << 20;
   /// One answer of a query or export, which is gathered in memory so that it speaks of one revision.
   uint64_t max_query_bytes = uint64_t{512} << 20;
-  /// What one query or export may look at: entities, and entries of incidence lists; about ten nanoseconds each.
+  /// What one query or export may look at: entities, and entries of incidence lists; about ten nanoseconds
+  /// each.
   uint64_t max_query_steps = 1'000'000'000;
   /// All answers of queries and exports that are gathered and wait to be read.
   uint64_t max_answer_bytes = uint64_t{2} << 30;

@@ -44,7 +44,8 @@ uint64_t RowWalk::CountSteps(Slot slot) const {
 uint64_t RowWalk::CountFaces(VertexId v) const {
   const auto edges = mesh_.IncidentEdges(v);
   uint64_t steps = 1 + edges.size();
-  for (size_t i = 0; i < edges.size() && steps < long_row_; ++i) steps += mesh_.IncidentFaces(edges[i]).size();
+  for (size_t i = 0; i < edges.size() && steps < long_row_; ++i)
+    steps += mesh_.IncidentFaces(edges[i]).size();
   return steps;
 }
 

@@ -49,8 +49,8 @@ bool Grows(const Edit& edit) {
          std::holds_alternative<AddAttributeEdit>(edit) || std::holds_alternative<SetAttributeEdit>(edit);
 }
 
-/// Bytes that the rows which `edits` set would add. A row at a far slot takes a page, so that is much more than
-/// what arrives.
+/// Bytes that the rows which `edits` set would add. A row at a far slot takes a page, so that is much more
+/// than what arrives.
 uint64_t AttributeGrowth(const Mesh& mesh, absl::Span<const Edit> edits) {
   struct Rows {
     const AttributeSpec* spec = nullptr;
@@ -261,8 +261,6 @@ absl::StatusOr<int64_t> Session::Delete(absl::string_view etag) {
   return revision();
 }
 
-std::string Session::EtagAt(int64_t revision) const {
-  return absl::StrCat(uid_, "-", revision);
-}
+std::string Session::EtagAt(int64_t revision) const { return absl::StrCat(uid_, "-", revision); }
 
 }  // namespace dynmesh

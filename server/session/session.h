@@ -58,10 +58,9 @@ absl::Status CheckSessionName(absl::string_view name);
 ///
 /// Edits take the writer lock for as long as they compute; reads share the reader lock. Neither is held over
 /// network or encoding. Followers are woken after each commit, when the lock is free again.
-/// Read(), Apply() and what else takes the lock may wait for it. So threads that others share ask access() for
-/// their turn first, and then do not wait; what is marked "Never waits" needs no turn.
-/// Once deleted, every call fails with NOT_FOUND SESSION_DELETED.
-/// Thread safety: full. Always owned by a shared_ptr.
+/// Read(), Apply() and what else takes the lock may wait for it. So threads that others share ask access()
+/// for their turn first, and then do not wait; what is marked "Never waits" needs no turn. Once deleted,
+/// every call fails with NOT_FOUND SESSION_DELETED. Thread safety: full. Always owned by a shared_ptr.
 class Session : public std::enable_shared_from_this<Session> {
  public:
   struct Options {

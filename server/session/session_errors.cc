@@ -43,11 +43,10 @@ absl::Status SessionDeleted(absl::string_view name) {
 }
 
 absl::Status SessionRecreated(absl::string_view name, absl::string_view expected, absl::string_view actual) {
-  return MakeError(absl::StatusCode::kAborted, reason::kSessionRecreated,
-                   absl::StrCat("session ", name, " was deleted, and another one has its name"),
-                   {{"session", std::string(name)},
-                    {"expected", std::string(expected)},
-                    {"actual", std::string(actual)}});
+  return MakeError(
+      absl::StatusCode::kAborted, reason::kSessionRecreated,
+      absl::StrCat("session ", name, " was deleted, and another one has its name"),
+      {{"session", std::string(name)}, {"expected", std::string(expected)}, {"actual", std::string(actual)}});
 }
 
 absl::Status ImportIdle(absl::Duration timeout) {

@@ -34,7 +34,8 @@ absl::Status SessionNotFound(absl::string_view name);
 /// NOT_FOUND SESSION_DELETED.
 absl::Status SessionDeleted(absl::string_view name);
 
-/// ABORTED SESSION_RECREATED, metadata expected and actual: the session of that name is not the one that is meant.
+/// ABORTED SESSION_RECREATED, metadata expected and actual: the session of that name is not the one that is
+/// meant.
 absl::Status SessionRecreated(absl::string_view name, absl::string_view expected, absl::string_view actual);
 
 /// DEADLINE_EXCEEDED IMPORT_IDLE, metadata limit.

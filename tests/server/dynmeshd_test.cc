@@ -235,7 +235,8 @@ TEST_F(DynmeshdTest, TheHealthCheckFollowsTheFlagsAndTheEnvironment) {
   EXPECT_EQ(ProbeTarget({"127.0.0.1:0"}, "/s"), "unix:/s");
   EXPECT_EQ(ProbeTarget({}, ""), "");
   const std::string socket = ::testing::TempDir() + "dynmeshd-" + std::to_string(getpid()) + ".sock";
-  const std::vector<std::string> environment = {"DYNMESHD_LISTEN=127.0.0.1:0", "DYNMESHD_UNIX_SOCKET=" + socket};
+  const std::vector<std::string> environment = {"DYNMESHD_LISTEN=127.0.0.1:0",
+                                                "DYNMESHD_UNIX_SOCKET=" + socket};
   const std::vector<std::string> check = {"--health_check=self"};
   Process process({"--ready_file=" + ready_file_}, environment);
   const auto addresses = AwaitReady();

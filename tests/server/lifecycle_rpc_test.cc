@@ -216,8 +216,8 @@ TEST_F(LifecycleTest, AStuckReaderDoesNotHoldTheDrain) {
   EXPECT_LT(absl::Now() - begin, absl::Seconds(30));
 }
 
-/// A session "book" whose hub edge has 50,000 faces, and the slot of that edge. Its queries have all the steps
-/// that they want.
+/// A session "book" whose hub edge has 50,000 faces, and the slot of that edge. Its queries have all the
+/// steps that they want.
 class BusyTest : public LifecycleTest {
  protected:
   BusyTest() {
@@ -267,7 +267,8 @@ TEST_F(BusyTest, ACallThatNobodyWaitsForEnds) {
 TEST_F(BusyTest, DrainEndsWhatComputes) {
   std::vector<std::thread> callers;
   for (int i = 0; i < 4; ++i) {
-    callers.emplace_back([&, i] { EXPECT_FALSE(AskForHours(kPatience, i % 2 == 0 ? 1'000'000 : 19'000).ok()); });
+    callers.emplace_back(
+        [&, i] { EXPECT_FALSE(AskForHours(kPatience, i % 2 == 0 ? 1'000'000 : 19'000).ok()); });
   }
   MustApply(TetBatch("other"));  // a round trip or two, in which they get there
   const absl::Time begin = absl::Now();

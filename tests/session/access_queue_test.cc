@@ -105,7 +105,8 @@ TEST(AccessQueueTest, ATurnThatIsDroppedPassesOn) {
   const AccessGrant last = queue->Acquire(kWrite);
 }
 
-// With the lock itself held, which no call does for long, one call waits for it and the others for their turn.
+// With the lock itself held, which no call does for long, one call waits for it and the others for their
+// turn.
 TEST(AccessQueueTest, EditsOfALockedSessionTakeOneThread) {
   Daemon daemon;  // three quick threads
   const SessionPtr locked = daemon.NewSession("locked");
@@ -122,9 +123,8 @@ TEST(AccessQueueTest, EditsOfALockedSessionTakeOneThread) {
   });
   holds.acquire();
   for (int i = 0; i < 100; ++i) {
-    locked->access().Post(kWrite, *daemon.workers().quick, [&](AccessGrant) {
-      EXPECT_TRUE(locked->Apply(AddTet(), {}).ok());
-    });
+    locked->access().Post(kWrite, *daemon.workers().quick,
+                          [&](AccessGrant) { EXPECT_TRUE(locked->Apply(AddTet(), {}).ok()); });
   }
   for (int i = 0; i < 100; ++i) {
     std::binary_semaphore answered{0};

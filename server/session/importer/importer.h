@@ -32,7 +32,8 @@ struct ImportOptions {
   std::string request_id = {};
 };
 
-/// Counts the imports that are under way in a daemon, and the bytes that they have staged. Thread safety: full.
+/// Counts the imports that are under way in a daemon, and the bytes that they have staged. Thread safety:
+/// full.
 class ImportGate {
  public:
   /// Leaves the gate when destroyed.

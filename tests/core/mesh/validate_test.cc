@@ -21,7 +21,8 @@ class MeshTestPeer {
   static void ForgetDuplicates(Mesh& mesh) { mesh.duplicates_[2].clear(); }
   static void SwapCode(Mesh& mesh) {
     const OrientedFace oriented = mesh.cell_faces_[1];
-    mesh.cell_faces_[1] = OrientedFace(oriented.face(), FaceCode{static_cast<uint8_t>(oriented.code().value ^ 4)});
+    mesh.cell_faces_[1] =
+        OrientedFace(oriented.face(), FaceCode{static_cast<uint8_t>(oriented.code().value ^ 4)});
   }
 };
 
@@ -58,12 +59,14 @@ TEST(ValidateTest, NamesTheUserThatAListHasTooOftenOrTooRarely) {
 }
 
 TEST(ValidateTest, SeesWhoIsPrimary) {
-  EXPECT_THAT(DamagedBy(MeshTestPeer::MakeBothPrimary, TwoEqualTriangles()),
-              UnorderedElementsAre("two primaries, one is face 1", "wrong number of face duplicates indexed"));
+  EXPECT_THAT(
+      DamagedBy(MeshTestPeer::MakeBothPrimary, TwoEqualTriangles()),
+      UnorderedElementsAre("two primaries, one is face 1", "wrong number of face duplicates indexed"));
   EXPECT_THAT(DamagedBy(MeshTestPeer::MakeNonePrimary, TwoEqualTriangles()),
               UnorderedElementsAre("duplicate face 0 without primary", "duplicate face 0 is not indexed"));
-  EXPECT_THAT(DamagedBy(MeshTestPeer::ForgetDuplicates, TwoEqualTriangles()),
-              UnorderedElementsAre("wrong number of face duplicates indexed", "duplicate face 1 is not indexed"));
+  EXPECT_THAT(
+      DamagedBy(MeshTestPeer::ForgetDuplicates, TwoEqualTriangles()),
+      UnorderedElementsAre("wrong number of face duplicates indexed", "duplicate face 1 is not indexed"));
 }
 
 TEST(ValidateTest, ReportsAreLimited) {
