@@ -62,7 +62,8 @@ class DiffBuilder {
     const size_t count = mesh_.changed(kind).CountSince(from_, cursor.next, end);
     if (count == 0) return;
     items_ += count;
-    kind == EntityKind::kVertex ? VisitVertices(cursor.next, end, count) : VisitElements(kind, cursor.next, end, count);
+    kind == EntityKind::kVertex ? VisitVertices(cursor.next, end, count)
+                                : VisitElements(kind, cursor.next, end, count);
   }
 
   /// Of `count` changed slots in [begin, end).

@@ -68,7 +68,8 @@ class BatchApplier {
                                           ElementTypeName(edit.type), " elements"));
     }
     std::vector<VertexId> vertices(edit.vertices.size());
-    DYNMESH_RETURN_IF_ERROR(ForEach(vertices.size() / size, [&](size_t i) { return ResolveAll(edit, i, vertices); }));
+    DYNMESH_RETURN_IF_ERROR(
+        ForEach(vertices.size() / size, [&](size_t i) { return ResolveAll(edit, i, vertices); }));
     return AddElements(edit.type, vertices);
   }
 
@@ -92,7 +93,8 @@ class BatchApplier {
     }
     return ForEach(edit.slots.size(), [&](size_t i) -> absl::Status {
       DYNMESH_ASSIGN_OR_RETURN(const EntityId id, ResolveEntity(edit.spec.kind, edit.slots[i]));
-      return mesh_.SetAttribute(column, id.slot, absl::MakeConstSpan(edit.rows).subspan(i * row_bytes, row_bytes));
+      return mesh_.SetAttribute(column, id.slot,
+                                absl::MakeConstSpan(edit.rows).subspan(i * row_bytes, row_bytes));
     });
   }
 
@@ -131,7 +133,8 @@ class BatchApplier {
   }
 
   static absl::Status BadKind(EntityKind kind) {
-    return InvalidArgument(reason::kBadEntityKind, absl::StrCat("entity kind ", Dimension(kind), " is none of 0-3"));
+    return InvalidArgument(reason::kBadEntityKind,
+                           absl::StrCat("entity kind ", Dimension(kind), " is none of 0-3"));
   }
 
   absl::StatusOr<EntityId> ResolveEntity(EntityKind kind, Slot slot) const {
@@ -193,7 +196,8 @@ class BatchApplier {
   std::vector<VertexId> new_vertices_;
 };
 
-absl::Status ApplyAll(Mesh& mesh, absl::Span<const Edit> edits, const BatchOptions& options, BatchResult& result) {
+absl::Status ApplyAll(Mesh& mesh, absl::Span<const Edit> edits, const BatchOptions& options,
+                      BatchResult& result) {
   BatchApplier applier(mesh, options, result);
   for (size_t i = 0; i < edits.size(); ++i) {
     result.results.emplace_back();
@@ -204,7 +208,8 @@ absl::Status ApplyAll(Mesh& mesh, absl::Span<const Edit> edits, const BatchOptio
   return absl::OkStatus();
 }
 
-/// Memory that runs out in the middle is a refusal like others: the batch is rolled back, which needs next to none.
+/// Memory that runs out in the middle is a refusal like others: the batch is rolled back, which needs next to
+/// none.
 absl::Status TryApplyAll(Mesh& mesh, absl::Span<const Edit> edits, const BatchOptions& options,
                          BatchResult& result) try {
   return ApplyAll(mesh, edits, options, result);
@@ -221,7 +226,8 @@ uint64_t NumItems(const Edit& edit) {
     uint64_t operator()(const RemoveVerticesEdit& e) const { return e.vertices.size(); }
     uint64_t operator()(const MoveVerticesEdit& e) const { return e.vertices.size(); }
     uint64_t operator()(const AddElementsEdit& e) const {
-      return IsElementType(static_cast<int>(e.type)) ? e.vertices.size() / NumVertices(e.type) : e.vertices.size();
+      return IsElementType(static_cast<int>(e.type)) ? e.vertices.size() / NumVertices(e.type)
+                                                     : e.vertices.size();
     }
     uint64_t operator()(const RemoveElementsEdit& e) const { return e.elements.size(); }
     uint64_t operator()(const AddAttributeEdit&) const { return 1; }
@@ -230,7 +236,8 @@ uint64_t NumItems(const Edit& edit) {
   return std::visit(Counter(), edit);
 }
 
-absl::StatusOr<BatchResult> ApplyBatch(Mesh& mesh, absl::Span<const Edit> edits, const BatchOptions& options) {
+absl::StatusOr<BatchResult> ApplyBatch(Mesh& mesh, absl::Span<const Edit> edits,
+                                       const BatchOptions& options) {
   BatchResult result;
   mesh.BeginBatch();
   absl::Status status = TryApplyAll(mesh, edits, options, result);

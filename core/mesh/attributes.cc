@@ -61,7 +61,8 @@ absl::Status CheckFinite(const AttributeSpec& spec, absl::Span<const uint8_t> va
 absl::Span<const uint8_t> AttributeColumn::Row(Slot slot) const {
   const size_t page = slot / StampColumn::kPageSlots;
   if (page >= pages_.size() || pages_[page].empty()) return zeros_;
-  return absl::MakeConstSpan(pages_[page]).subspan(slot % StampColumn::kPageSlots * zeros_.size(), zeros_.size());
+  return absl::MakeConstSpan(pages_[page])
+      .subspan(slot % StampColumn::kPageSlots * zeros_.size(), zeros_.size());
 }
 
 void AttributeColumn::SetRow(Slot slot, absl::Span<const uint8_t> row, Stamp stamp) {

@@ -46,8 +46,8 @@ absl::Status CheckFinite(const AttributeSpec& spec, absl::Span<const uint8_t> va
 
 /// One column: a row of `components` scalars for every slot of its kind, little-endian as in memory.
 ///
-/// A row that was never set, or whose slot got a new occupant, is all zeros. Rows are held in pages, so that one
-/// row at a far slot costs one page.
+/// A row that was never set, or whose slot got a new occupant, is all zeros. Rows are held in pages, so that
+/// one row at a far slot costs one page.
 class AttributeColumn {
  public:
   /// `born`: revision at which the column was added.

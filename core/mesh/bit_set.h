@@ -73,8 +73,8 @@ class BitSet {
     }
   }
 
-  /// Writes the smallest members >= slot, at most `max_members` of them, to `out`; returns how many. The next call may
-  /// go on at the last one + 1. Cost: as Next, but a word at a time.
+  /// Writes the smallest members >= slot, at most `max_members` of them, to `out`; returns how many. The next
+  /// call may go on at the last one + 1. Cost: as Next, but a word at a time.
   size_t Collect(Slot slot, Slot* out, size_t max_members) const {
     size_t count = 0;
     size_t word = slot / 64;

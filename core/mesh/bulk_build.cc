@@ -56,8 +56,9 @@ absl::Status BulkBuilder::AddElements(ElementType type, absl::Span<const VertexI
   }
   const size_t size = NumVertices(type);
   if (vertices.size() % size != 0) {
-    return InvalidArgument(reason::kBadArrayLength, absl::StrCat(vertices.size(), " ids are no whole number of ",
-                                                                 ElementTypeName(type), "s"));
+    return InvalidArgument(
+        reason::kBadArrayLength,
+        absl::StrCat(vertices.size(), " ids are no whole number of ", ElementTypeName(type), "s"));
   }
   for (VertexId v : vertices) {
     if (v.slot() >= counts_[0]) return EntityNotFound(reason::kUnknownEntity, v);
@@ -291,7 +292,8 @@ absl::Status BulkBuilder::RefuseDuplicate(EntityId id) const {
   EntityId original(id.kind, kNoSlot);
   if (id.kind == EntityKind::kCell) original = mesh_.FindTwin(CellId(id.slot));
   if (id.kind == EntityKind::kFace) original = mesh_.FindFace(mesh_.VerticesOf(id));
-  if (id.kind == EntityKind::kEdge) original = mesh_.FindEdge(mesh_.VerticesOf(id)[0], mesh_.VerticesOf(id)[1]);
+  if (id.kind == EntityKind::kEdge)
+    original = mesh_.FindEdge(mesh_.VerticesOf(id)[0], mesh_.VerticesOf(id)[1]);
   return WithMetadata(mesh_.RefuseDuplicate(original), "position", absl::StrCat(id.slot));
 }
 

@@ -47,14 +47,15 @@ struct BulkResult {
 ///     BulkResult result = *std::move(builder).Finish();
 ///     result.mesh.Commit();
 ///
-/// Law: with SlotOrder::kCaller the mesh equals, to the last id, one to which the same vertices, then wire edges,
-/// faces and cells were added one by one; with kHilbert it equals that of the items in the order that `slots` tells.
+/// Law: with SlotOrder::kCaller the mesh equals, to the last id, one to which the same vertices, then wire
+/// edges, faces and cells were added one by one; with kHilbert it equals that of the items in the order that
+/// `slots` tells.
 ///
-/// How: uses of faces by cells find their first equal (FirstEqual); a scan over the cells in order then numbers faces
-/// as they first occur and names the edges of each cell, by those of its known faces as far as these reach; the names
-/// that remain find their first equal in turn. Scattered input is matched in spatial order, which changes no number.
-/// Cost: linear, but for vertices with thousands of edges. Memory beside the mesh: some 30 bytes for a tetrahedron.
-/// Thread safety: that of std::vector.
+/// How: uses of faces by cells find their first equal (FirstEqual); a scan over the cells in order then
+/// numbers faces as they first occur and names the edges of each cell, by those of its known faces as far as
+/// these reach; the names that remain find their first equal in turn. Scattered input is matched in spatial
+/// order, which changes no number. Cost: linear, but for vertices with thousands of edges. Memory beside the
+/// mesh: some 30 bytes for a tetrahedron. Thread safety: that of std::vector.
 class BulkBuilder {
  public:
   explicit BulkBuilder(const BulkOptions& options) : options_(options), mesh_(options.mesh) {}
@@ -70,8 +71,8 @@ class BulkBuilder {
   /// Bytes that the mesh takes so far.
   size_t memory_bytes() const { return mesh_.memory_bytes(); }
 
-  /// Errors: INVALID_ARGUMENT DUPLICATE_ELEMENT (if so opted; metadata position: which of the elements of its kind);
-  /// RESOURCE_EXHAUSTED; those of the progress function.
+  /// Errors: INVALID_ARGUMENT DUPLICATE_ELEMENT (if so opted; metadata position: which of the elements of its
+  /// kind); RESOURCE_EXHAUSTED; those of the progress function.
   absl::StatusOr<BulkResult> Finish() &&;
 
  private:
@@ -121,8 +122,8 @@ class BulkBuilder {
   uint64_t done_ = 0, total_ = 0;
   Permutation walk_;  ///< spatial order of the cells of scattered input, else empty
 
-  /// For each use of a face: first the first equal use; once scanned, the face. Face elements come first, then
-  /// the faces of cell 0, of cell 1, ... at a stride.
+  /// For each use of a face: first the first equal use; once scanned, the face. Face elements come first,
+  /// then the faces of cell 0, of cell 1, ... at a stride.
   std::vector<uint32_t> uses_;
   /// Names of edges: a name for each occurrence that no known face explains. Wire edges come first.
   std::vector<std::array<VertexId, 2>> names_;

@@ -78,12 +78,14 @@ absl::Status BulkBuilder::MatchFaceKeys() {
     }
   };
   for (Slot f = 0; f < num_faces; ++f) first.Count(KeyOf<Words>(mesh_.Vertices(FaceId(f))).lowest);
-  for (Slot c = 0; c < num_cells; ++c) for_each_use(c, [&](uint32_t, const auto& key) { first.Count(key.lowest); });
+  for (Slot c = 0; c < num_cells; ++c)
+    for_each_use(c, [&](uint32_t, const auto& key) { first.Count(key.lowest); });
   first.EndCount();
   for (Slot f = 0; f < num_faces; ++f) first.Put(f, KeyOf<Words>(mesh_.Vertices(FaceId(f))));
   for (Slot k = 0; k < num_cells; ++k) {
     if (!walk_.empty() && k + kPrefetchDistance < num_cells) {
-      __builtin_prefetch(&mesh_.cell_vertices_[size_t{walk_[k + kPrefetchDistance]} * mesh_.cell_vertex_stride_]);
+      __builtin_prefetch(
+          &mesh_.cell_vertices_[size_t{walk_[k + kPrefetchDistance]} * mesh_.cell_vertex_stride_]);
     }
     for_each_use(walk_.empty() ? k : walk_[k], [&](uint32_t use, const auto& key) { first.Put(use, key); });
     if (k % kItemsPerTick == 0) DYNMESH_RETURN_IF_ERROR(Tick(std::min<size_t>(kItemsPerTick, num_cells - k)));
@@ -118,7 +120,8 @@ void BulkBuilder::ScanFaceElement(FaceId f) {
   EdgeId* edges = &mesh_.face_edges_[size_t{f.slot()} * mesh_.face_stride_];
   const FaceId first(uses_[f.slot()]);
   if (first == f) {
-    for (size_t k = 0; k < vertices.size(); ++k) edges[k] = NewName(vertices[k], vertices[(k + 1) % vertices.size()]);
+    for (size_t k = 0; k < vertices.size(); ++k)
+      edges[k] = NewName(vertices[k], vertices[(k + 1) % vertices.size()]);
     return;
   }
   const FaceCode code = *MatchFace(mesh_.Vertices(first), vertices);

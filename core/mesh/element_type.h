@@ -57,8 +57,8 @@ struct LocalFace {
 /// A triangle or quad has one face, itself; a wire edge has none.
 struct ElementTemplate {
   ElementType type;
-  EntityKind kind;                ///< dimension of the element itself
-  absl::string_view name;        ///< "tetrahedron"
+  EntityKind kind;         ///< dimension of the element itself
+  absl::string_view name;  ///< "tetrahedron"
   uint8_t num_vertices;
   uint8_t num_edges;
   uint8_t num_faces;
@@ -85,9 +85,9 @@ inline const ElementTemplate& TemplateOf(ElementType type) {
 }
 
 constexpr EntityKind KindOf(ElementType type) {
-  return type == ElementType::kWireEdge                                  ? EntityKind::kEdge
+  return type == ElementType::kWireEdge                                 ? EntityKind::kEdge
          : type == ElementType::kTriangle || type == ElementType::kQuad ? EntityKind::kFace
-                                                                          : EntityKind::kCell;
+                                                                        : EntityKind::kCell;
 }
 
 constexpr int NumVertices(ElementType type) {

@@ -20,32 +20,32 @@ namespace dynmesh {
 
 /// Reasons, one for each way in which a request can be refused. The strings are part of the API.
 namespace reason {
-inline constexpr char kEntityRemoved[] = "ENTITY_REMOVED";      // id is gone, or another was born there
-inline constexpr char kUnknownEntity[] = "UNKNOWN_ENTITY";      // slot was never used
-inline constexpr char kNotAnElement[] = "NOT_AN_ELEMENT";       // derived entity where an element is asked
-inline constexpr char kVertexInUse[] = "VERTEX_IN_USE";         // vertex still has incident edges
+inline constexpr char kEntityRemoved[] = "ENTITY_REMOVED";  // id is gone, or another was born there
+inline constexpr char kUnknownEntity[] = "UNKNOWN_ENTITY";  // slot was never used
+inline constexpr char kNotAnElement[] = "NOT_AN_ELEMENT";   // derived entity where an element is asked
+inline constexpr char kVertexInUse[] = "VERTEX_IN_USE";     // vertex still has incident edges
 inline constexpr char kDuplicateElement[] = "DUPLICATE_ELEMENT";
-inline constexpr char kNonFinite[] = "NON_FINITE_VALUE";        // NaN or infinite
+inline constexpr char kNonFinite[] = "NON_FINITE_VALUE";  // NaN or infinite
 inline constexpr char kBadArrayLength[] = "BAD_ARRAY_LENGTH";
 inline constexpr char kBadElementType[] = "BAD_ELEMENT_TYPE";
 inline constexpr char kBadEntityKind[] = "BAD_ENTITY_KIND";
 inline constexpr char kBadArgument[] = "BAD_ARGUMENT";
 inline constexpr char kUnknownAttribute[] = "UNKNOWN_ATTRIBUTE";
 inline constexpr char kAttributeExists[] = "ATTRIBUTE_EXISTS";
-inline constexpr char kLimitExceeded[] = "LIMIT_EXCEEDED";      // metadata: limit, value, requested
+inline constexpr char kLimitExceeded[] = "LIMIT_EXCEEDED";  // metadata: limit, value, requested
 inline constexpr char kRevisionMismatch[] = "REVISION_MISMATCH";
 inline constexpr char kRevisionInFuture[] = "REVISION_IN_FUTURE";
-inline constexpr char kRequestIdReused[] = "REQUEST_ID_REUSED"; // same id, other content
+inline constexpr char kRequestIdReused[] = "REQUEST_ID_REUSED";  // same id, other content
 inline constexpr char kSessionNotFound[] = "SESSION_NOT_FOUND";
 inline constexpr char kSessionExists[] = "SESSION_EXISTS";
 inline constexpr char kSessionNotEmpty[] = "SESSION_NOT_EMPTY";
-inline constexpr char kSessionDeleted[] = "SESSION_DELETED";    // deleted while the call ran
+inline constexpr char kSessionDeleted[] = "SESSION_DELETED";      // deleted while the call ran
 inline constexpr char kSessionRecreated[] = "SESSION_RECREATED";  // another session has the name now
 inline constexpr char kEtagMismatch[] = "ETAG_MISMATCH";
 inline constexpr char kBadSessionName[] = "BAD_SESSION_NAME";
 inline constexpr char kBadPageToken[] = "BAD_PAGE_TOKEN";
-inline constexpr char kCountMismatch[] = "COUNT_MISMATCH";      // sent other than announced
-inline constexpr char kImportIdle[] = "IMPORT_IDLE";            // nothing arrived for too long
+inline constexpr char kCountMismatch[] = "COUNT_MISMATCH";  // sent other than announced
+inline constexpr char kImportIdle[] = "IMPORT_IDLE";        // nothing arrived for too long
 inline constexpr char kShuttingDown[] = "SHUTTING_DOWN";
 inline constexpr char kCorruptPayload[] = "CORRUPT_PAYLOAD";
 inline constexpr char kUnsupportedFormat[] = "UNSUPPORTED_FORMAT";
@@ -95,11 +95,11 @@ std::string JoinSlots(absl::Span<const Slot> slots);
 }  // namespace dynmesh
 
 /// Returns from the enclosing function unless `expr` is OK.
-#define DYNMESH_RETURN_IF_ERROR(expr)                        \
-  do {                                                       \
+#define DYNMESH_RETURN_IF_ERROR(expr)                                   \
+  do {                                                                  \
     if (absl::Status dynmesh_status_ = (expr); !dynmesh_status_.ok()) { \
-      return dynmesh_status_;                                \
-    }                                                        \
+      return dynmesh_status_;                                           \
+    }                                                                   \
   } while (false)
 
 #define DYNMESH_CONCAT_INNER_(a, b) a##b

@@ -12,23 +12,25 @@
 
 namespace dynmesh {
 
-/// What two edges or faces must share to be the same: the lowest vertex, and the `Words` others in a canonical order.
+/// What two edges or faces must share to be the same: the lowest vertex, and the `Words` others in a
+/// canonical order.
 template <int Words>
 struct VertexKey {
   Slot lowest;
   std::array<Slot, Words> others;
 };
 
-/// For each of many keyed items the first (lowest index) item of the same key: how a bulk build finds shared edges
-/// and faces.
+/// For each of many keyed items the first (lowest index) item of the same key: how a bulk build finds shared
+/// edges and faces.
 ///
-/// Items are sorted into a bucket for each lowest vertex by counting, and compared within their bucket: a few dozen
-/// neighbours each, all in cache when items come in spatial order.
-/// Cost: O(items + buckets) while buckets are small, O(m log m) for a bucket of m items.
+/// Items are sorted into a bucket for each lowest vertex by counting, and compared within their bucket: a few
+/// dozen neighbours each, all in cache when items come in spatial order. Cost: O(items + buckets) while
+/// buckets are small, O(m log m) for a bucket of m items.
 template <int Words>
 class FirstEqual {
  public:
-  FirstEqual(size_t num_items, size_t num_buckets) : items_(num_items), begin_(num_buckets + 1), first_(num_items) {}
+  FirstEqual(size_t num_items, size_t num_buckets)
+      : items_(num_items), begin_(num_buckets + 1), first_(num_items) {}
 
   /// First pass, once for each item.
   void Count(Slot lowest) { ++begin_[lowest + 1]; }
@@ -37,12 +39,15 @@ class FirstEqual {
   }
 
   /// Second pass, once for each item, in any order.
-  void Put(uint32_t index, const VertexKey<Words>& key) { items_[begin_[key.lowest]++] = {index, key.others}; }
+  void Put(uint32_t index, const VertexKey<Words>& key) {
+    items_[begin_[key.lowest]++] = {index, key.others};
+  }
 
   /// first[i] = lowest index with the key of item i. Frees what only the passes needed.
   std::vector<uint32_t> Take() && {
     uint32_t begin = 0;
-    for (size_t bucket = 0; bucket + 1 < begin_.size(); ++bucket) {  // Put moved each begin to its bucket's end
+    for (size_t bucket = 0; bucket + 1 < begin_.size();
+         ++bucket) {  // Put moved each begin to its bucket's end
       const uint32_t end = begin_[bucket];
       end - begin <= kSmall ? CompareAll(begin, end) : SortAndCompare(begin, end);
       begin = end;

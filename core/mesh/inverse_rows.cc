@@ -31,8 +31,9 @@ void ForEachCellEdge(const Mesh& mesh, Fn fn) {
   }
 }
 
-/// Calls fn(neighbor, slot) for every entry `neighbor` of every row `slot` of vertex->vertices, vertex->faces,
-/// vertex->cells or edge->cells, neighbours ascending; perhaps more than once, and for slot = neighbor.
+/// Calls fn(neighbor, slot) for every entry `neighbor` of every row `slot` of vertex->vertices,
+/// vertex->faces, vertex->cells or edge->cells, neighbours ascending; perhaps more than once, and for slot =
+/// neighbor.
 template <typename Fn>
 void ForEachEntry(const Mesh& mesh, Relation relation, Fn fn) {
   switch (relation.to) {
@@ -59,7 +60,8 @@ void ForEachEntry(const Mesh& mesh, Relation relation, Fn fn) {
 std::vector<uint32_t> RowBounds(const Mesh& mesh, Relation relation) {
   std::vector<uint32_t> bounds(mesh.slots(relation.from).limit());
   if (relation.to == EntityKind::kVertex) {
-    ForEachLive(mesh, EntityKind::kVertex, [&](Slot v) { bounds[v] = mesh.IncidentEdges(VertexId(v)).size(); });
+    ForEachLive(mesh, EntityKind::kVertex,
+                [&](Slot v) { bounds[v] = mesh.IncidentEdges(VertexId(v)).size(); });
   } else {
     ForEachEntry(mesh, relation, [&](Slot, Slot slot) { ++bounds[slot]; });
   }
@@ -69,7 +71,8 @@ std::vector<uint32_t> RowBounds(const Mesh& mesh, Relation relation) {
 }  // namespace
 
 bool InverseRows::Pays(const Mesh& mesh, Relation relation) {
-  const bool listed = Dimension(relation.to) == Dimension(relation.from) + 1;  // the mesh has these rows as lists
+  const bool listed =
+      Dimension(relation.to) == Dimension(relation.from) + 1;  // the mesh has these rows as lists
   const bool upward = relation.to > relation.from && !listed;
   const bool vertices = relation.from == EntityKind::kVertex && relation.to == EntityKind::kVertex;
   const EntityKind walked = vertices ? EntityKind::kEdge : relation.to;
@@ -94,7 +97,8 @@ InverseRows::InverseRows(const Mesh& mesh, Relation relation) {
   } else if (mesh.IsPlain()) {  // an element names nothing twice
     ForEachEntry(mesh, relation, [&](Slot neighbor, Slot slot) { ids_[end_[slot]++] = neighbor; });
   } else {
-    ForEachEntry(mesh, relation, [&](Slot neighbor, Slot slot) { Enter(end_[slot], begin_[slot], neighbor); });
+    ForEachEntry(mesh, relation,
+                 [&](Slot neighbor, Slot slot) { Enter(end_[slot], begin_[slot], neighbor); });
   }
 }
 

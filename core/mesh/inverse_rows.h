@@ -10,15 +10,16 @@
 
 namespace dynmesh {
 
-/// All rows of a relation at once, by walking it backwards: the entities that rows hold are walked in ascending order
-/// and each is entered in the rows that it belongs to, so that rows come out sorted. Several times as fast as
-/// gathering and sorting row by row.
+/// All rows of a relation at once, by walking it backwards: the entities that rows hold are walked in
+/// ascending order and each is entered in the rows that it belongs to, so that rows come out sorted. Several
+/// times as fast as gathering and sorting row by row.
 ///
 /// Thread safety: that of std::vector.
 class InverseRows {
  public:
-  /// Whether this is the way to walk every row: vertex->vertices, vertex->faces, vertex->cells and edge->cells, on
-  /// meshes that are not small. Other rows have so many entries that a walk in memory's order is dearer than sorting.
+  /// Whether this is the way to walk every row: vertex->vertices, vertex->faces, vertex->cells and
+  /// edge->cells, on meshes that are not small. Other rows have so many entries that a walk in memory's order
+  /// is dearer than sorting.
   static bool Pays(const Mesh& mesh, Relation relation);
 
   /// REQUIRES: Pays(mesh, relation). Cost: the incidences, and 4 bytes of memory for each.

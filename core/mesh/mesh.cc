@@ -90,7 +90,8 @@ absl::Status Mesh::RemoveVertex(VertexId v) {
   DYNMESH_RETURN_IF_ERROR(CheckLive(v));
   if (const auto edges = IncidentEdges(v); !edges.empty()) {
     return FailedPrecondition(
-        reason::kVertexInUse, absl::StrCat("vertex ", v.slot(), " still has ", edges.size(), " incident edges"),
+        reason::kVertexInUse,
+        absl::StrCat("vertex ", v.slot(), " still has ", edges.size(), " incident edges"),
         {{"kind", "vertex"}, {"ids", absl::StrCat(v.slot())}});
   }
   DestroyVertex(v);
@@ -100,7 +101,8 @@ absl::Status Mesh::RemoveVertex(VertexId v) {
 absl::Status Mesh::MoveVertex(VertexId v, const Point& position) {
   DYNMESH_RETURN_IF_ERROR(CheckLive(v));
   if (!IsFinite(position)) return NonFinitePosition();
-  Record({JournalOp::kMoveVertex, EntityKind::kVertex, v.slot(), 0, changed(EntityKind::kVertex).At(v.slot())});
+  Record(
+      {JournalOp::kMoveVertex, EntityKind::kVertex, v.slot(), 0, changed(EntityKind::kVertex).At(v.slot())});
   if (journaling()) journal_.positions.push_back(Position(v));
   checksum_.geometry -= Checksum::PositionTerm(v.slot(), Position(v));
   positions_[v.slot()] = position;
@@ -143,7 +145,8 @@ absl::Status Mesh::SetAttribute(int column, Slot slot, absl::Span<const uint8_t>
                            {{"attribute", spec.name}});
   }
   if (!CheckFinite(spec, row).ok()) {
-    return InvalidArgument(reason::kNonFinite, absl::StrCat("a value of attribute '", spec.name, "' is NaN or infinite"),
+    return InvalidArgument(reason::kNonFinite,
+                           absl::StrCat("a value of attribute '", spec.name, "' is NaN or infinite"),
                            {{"attribute", spec.name}});
   }
   WriteAttribute(column, slot, row);

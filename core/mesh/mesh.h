@@ -45,8 +45,8 @@ class OrientedFace {
 
 enum class DuplicatePolicy { kKeep, kRefuse };
 
-/// Upper bounds on slots ever used, for each kind; beyond: RESOURCE_EXHAUSTED. An element is let in only if there is
-/// room for all its faces and edges, as if none of them existed.
+/// Upper bounds on slots ever used, for each kind; beyond: RESOURCE_EXHAUSTED. An element is let in only if
+/// there is room for all its faces and edges, as if none of them existed.
 struct MeshLimits {
   /// Vertex ids stay below 2^31 (edit batches use the top bit), faces below 2^29 (OrientedFace).
   std::array<uint32_t, kNumEntityKinds> max_slots = {0x7fffffffu, 0x7fffffffu, 0x1fffffffu, 0x7fffffffu};
@@ -122,7 +122,9 @@ class Mesh {
   /// A kept element that stands where another element of the same vertices stood already. Cells never are.
   bool IsDuplicate(EntityId id) const { return id.kind != EntityKind::kVertex && flags(id) & kDuplicateFlag; }
   /// An element that names a vertex twice.
-  bool IsDegenerate(EntityId id) const { return id.kind != EntityKind::kVertex && flags(id) & kDegenerateFlag; }
+  bool IsDegenerate(EntityId id) const {
+    return id.kind != EntityKind::kVertex && flags(id) & kDegenerateFlag;
+  }
   /// Whether no element is degenerate.
   bool IsPlain() const { return num_degenerate_ == 0; }
 
@@ -181,8 +183,8 @@ class Mesh {
   /// Errors: INVALID_ARGUMENT NON_FINITE_VALUE.
   absl::Status MoveVertex(VertexId v, const Point& position);
 
-  /// Adds an element; a derived face or edge with the same vertices becomes it and takes its vertex order (but a
-  /// face of more than 64 cells that lies otherwise stays, and the element becomes a duplicate of it).
+  /// Adds an element; a derived face or edge with the same vertices becomes it and takes its vertex order
+  /// (but a face of more than 64 cells that lies otherwise stays, and the element becomes a duplicate of it).
   /// Degenerate elements (a vertex named twice) are kept.
   /// Errors: INVALID_ARGUMENT BAD_ELEMENT_TYPE, BAD_ARRAY_LENGTH, DUPLICATE_ELEMENT (if so opted);
   /// RESOURCE_EXHAUSTED.
@@ -191,9 +193,10 @@ class Mesh {
   /// Errors: FAILED_PRECONDITION NOT_AN_ELEMENT.
   absl::Status RemoveElement(EntityId id);
 
-  /// AddElement for NumVertices(type) ids an element, in spatial order when there are many, so that new slots are
-  /// handed out along a Hilbert curve; equal elements keep their order. Calls added(i, id) after each.
-  /// Errors: those of AddElement, with metadata index. REQUIRES: a batch is open, and is rolled back after an error.
+  /// AddElement for NumVertices(type) ids an element, in spatial order when there are many, so that new slots
+  /// are handed out along a Hilbert curve; equal elements keep their order. Calls added(i, id) after each.
+  /// Errors: those of AddElement, with metadata index. REQUIRES: a batch is open, and is rolled back after an
+  /// error.
   absl::Status AddElements(ElementType type, absl::Span<const VertexId> vertices,
                            absl::FunctionRef<void(size_t, EntityId)> added);
   /// RemoveElement for each of `elements`, in ascending order; none may be named twice.
@@ -267,7 +270,9 @@ class Mesh {
 
   uint8_t& flags(EntityId id) { return flags_[Dimension(id.kind)][id.slot]; }
   uint8_t flags(EntityId id) const { return flags_[Dimension(id.kind)][id.slot]; }
-  int FaceSize(FaceId f) const { return face_stride_ == kMaxFaceVertices && Type(f) == ElementType::kQuad ? 4 : 3; }
+  int FaceSize(FaceId f) const {
+    return face_stride_ == kMaxFaceVertices && Type(f) == ElementType::kQuad ? 4 : 3;
+  }
   Stamp next_stamp() const { return static_cast<Stamp>(revision_ + 1); }
   bool journaling() const { return batch_open_; }
   Slots& mutable_slots(EntityKind kind) { return slots_[Dimension(kind)]; }
@@ -295,7 +300,8 @@ class Mesh {
 
   // mesh_batches.cc
   std::vector<uint32_t> OrderOfElements(absl::Span<const VertexId> vertices, size_t size) const;
-  absl::Status RemoveAscending(EntityKind kind, absl::Span<const Slot> sorted, absl::Span<const Slot> elements);
+  absl::Status RemoveAscending(EntityKind kind, absl::Span<const Slot> sorted,
+                               absl::Span<const Slot> elements);
 
   // mesh_links.cc: creating and destroying single entities with their links, counters and journal
   EdgeId CreateEdge(VertexId a, VertexId b, uint8_t extra_flags);
@@ -367,7 +373,8 @@ class Mesh {
   int64_t revision_ = 0;
   std::array<Slots, kNumEntityKinds> slots_;
   std::array<StampColumn, kNumEntityKinds> changed_;
-  std::array<std::vector<uint8_t>, kNumEntityKinds> flags_;  ///< type | element | duplicate | degenerate; none for vertices
+  std::array<std::vector<uint8_t>, kNumEntityKinds>
+      flags_;  ///< type | element | duplicate | degenerate; none for vertices
   std::array<uint32_t, kNumEntityKinds> num_elements_ = {};
   uint32_t num_degenerate_ = 0;  ///< elements
   /// Slots of duplicate edges and faces, by their vertices.
@@ -398,8 +405,8 @@ class Mesh {
   StoredRelations stored_;
 
   std::array<BitSet, kNumEntityKinds> boundary_;
-  /// Of an edge: its faces on the boundary, and one more if it has exactly one face. Of a vertex: ends of its edges
-  /// on the boundary.
+  /// Of an edge: its faces on the boundary, and one more if it has exactly one face. Of a vertex: ends of its
+  /// edges on the boundary.
   std::array<std::vector<uint32_t>, 2> boundary_uses_;
 
   std::vector<AttributeColumn> attributes_;

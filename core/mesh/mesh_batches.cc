@@ -59,7 +59,8 @@ absl::Status Mesh::RemoveElements(EntityKind kind, absl::Span<const Slot> elemen
   return RemoveAscending(kind, sorted, elements);
 }
 
-absl::Status Mesh::RemoveAscending(EntityKind kind, absl::Span<const Slot> sorted, absl::Span<const Slot> elements) {
+absl::Status Mesh::RemoveAscending(EntityKind kind, absl::Span<const Slot> sorted,
+                                   absl::Span<const Slot> elements) {
   const auto twice = std::adjacent_find(sorted.begin(), sorted.end());
   if (twice != sorted.end()) {
     const auto first = std::find(elements.begin(), elements.end(), *twice);

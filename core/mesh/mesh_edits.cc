@@ -78,7 +78,8 @@ absl::Status Mesh::CheckRoom(ElementType type) const {
     }
   }
   if (!vertex_edges_.HasRoom(kMaxElementEdges) || !edge_faces_.HasRoom(kMaxElementEdges) ||
-      !face_overflow_.HasRoom(kMaxElementFaces) || !stored_.HasRoom(kMaxElementFaces * 2 * StoredRows::kMaxRow)) {
+      !face_overflow_.HasRoom(kMaxElementFaces) ||
+      !stored_.HasRoom(kMaxElementFaces * 2 * StoredRows::kMaxRow)) {
     return LimitExceeded("max_incident_entities", IncidenceLists<EdgeId>::kMaxLength,
                          uint64_t{IncidenceLists<EdgeId>::kMaxLength} + 1);
   }
@@ -86,10 +87,10 @@ absl::Status Mesh::CheckRoom(ElementType type) const {
 }
 
 absl::Status Mesh::RefuseDuplicate(EntityId existing) const {
-  return InvalidArgument(reason::kDuplicateElement,
-                         absl::StrCat("the element equals ", EntityKindName(existing.kind), " ", existing.slot),
-                         {{"kind", std::string(EntityKindName(existing.kind))},
-                          {"ids", absl::StrCat(existing.slot)}});
+  return InvalidArgument(
+      reason::kDuplicateElement,
+      absl::StrCat("the element equals ", EntityKindName(existing.kind), " ", existing.slot),
+      {{"kind", std::string(EntityKindName(existing.kind))}, {"ids", absl::StrCat(existing.slot)}});
 }
 
 // ---- Look-up ----
@@ -130,7 +131,8 @@ Mesh::FaceMatch Mesh::FindFaceAround(EdgeId e, VertexSpan vertices) const {
   if (vertices.size() > static_cast<size_t>(face_stride_)) return {};  // there are no quads
   if (edge_faces_.Length(e.slot()) > kHubDegree) {
     const auto it = hub_faces_.find(CanonicalCycle(vertices));
-    return it == hub_faces_.end() ? FaceMatch() : FaceMatch{it->second, *MatchFace(Vertices(it->second), vertices)};
+    return it == hub_faces_.end() ? FaceMatch()
+                                  : FaceMatch{it->second, *MatchFace(Vertices(it->second), vertices)};
   }
   // Equal cycles have equal exclusive-ors: few others pass.
   const Slot sieve = XorOf(vertices.data(), vertices.size());
@@ -192,7 +194,9 @@ CellId Mesh::FindCell(ElementType type, const CellParts& parts) const {
 }
 
 CellId Mesh::FindCellButNot(CellId c, ElementType type, const CellParts& parts) const {
-  const auto uses = [this](const FaceMatch& match) { return match.face.valid() ? NumFaceCells(match.face) : 0; };
+  const auto uses = [this](const FaceMatch& match) {
+    return match.face.valid() ? NumFaceCells(match.face) : 0;
+  };
   const auto least_used =
       std::min_element(parts.faces.begin(), parts.faces.begin() + TemplateOf(type).num_faces,
                        [&](const FaceMatch& a, const FaceMatch& b) { return uses(a) < uses(b); });
@@ -240,10 +244,10 @@ absl::StatusOr<EntityId> Mesh::AddFaceElement(VertexSpan vertices) {
   std::array<EdgeId, kMaxFaceVertices> edges;
   for (size_t k = 0; k < n; ++k) edges[k] = FindEdge(vertices[k], vertices[(k + 1) % n]);
   const auto edge_span = absl::MakeConstSpan(edges.data(), n);
-  const bool all_exist =
-      std::all_of(edge_span.begin(), edge_span.end(), [](EdgeId e) { return e.valid(); });
+  const bool all_exist = std::all_of(edge_span.begin(), edge_span.end(), [](EdgeId e) { return e.valid(); });
   const FaceMatch match = all_exist ? FindFaceAround(LeastUsed(edge_span), vertices) : FaceMatch();
-  const bool cheap = match.code.value == 0 || (match.face.valid() && NumFaceCells(match.face) <= kMaxReorderedCells);
+  const bool cheap =
+      match.code.value == 0 || (match.face.valid() && NumFaceCells(match.face) <= kMaxReorderedCells);
   if (match.face.valid() && !IsElement(match.face) && cheap) {
     ReorderFace(match.face, match.code);
     SetElementFlag(match.face);
@@ -276,7 +280,8 @@ void Mesh::EnsureCellParts(const ElementTemplate& shape, VertexSpan vertices, Ce
   const bool degenerate = HasRepeats(vertices);
   for (int e = 0; e < shape.num_edges; ++e) {
     const LocalEdge& ends = shape.edges[e];
-    if (!parts.edges[e].valid()) parts.edges[e] = EnsureEdge(vertices[ends.vertices[0]], vertices[ends.vertices[1]]);
+    if (!parts.edges[e].valid())
+      parts.edges[e] = EnsureEdge(vertices[ends.vertices[0]], vertices[ends.vertices[1]]);
   }
   for (int i = 0; i < shape.num_faces; ++i) {
     if (parts.faces[i].face.valid()) continue;

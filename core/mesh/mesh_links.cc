@@ -39,7 +39,8 @@ FaceId Mesh::CreateFace(VertexSpan vertices, absl::Span<const EdgeId> edges, uin
 CellId Mesh::CreateCell(ElementType type, VertexSpan vertices, absl::Span<const OrientedFace> faces) {
   JournalEntry entry;
   const CellId c(NewSlot(EntityKind::kCell, entry));
-  std::copy(vertices.begin(), vertices.end(), cell_vertices_.begin() + size_t{c.slot()} * cell_vertex_stride_);
+  std::copy(vertices.begin(), vertices.end(),
+            cell_vertices_.begin() + size_t{c.slot()} * cell_vertex_stride_);
   std::copy(faces.begin(), faces.end(), cell_faces_.begin() + size_t{c.slot()} * cell_face_stride_);
   flags(c) = static_cast<uint8_t>(type) | kElementFlag | (HasRepeats(vertices) ? kDegenerateFlag : 0);
   LinkCell(c);
@@ -224,7 +225,8 @@ void Mesh::RemoveFaceCell(FaceId f, CellId c) {
 
 void Mesh::AddEdgeFace(EdgeId e, FaceId f) {
   const uint32_t before = edge_faces_.Length(e.slot());
-  edge_faces_.Add(e.slot(), f, NumLive(EntityKind::kCell) > 0 ? 4 : 2);  // solids: most edges have four and more
+  edge_faces_.Add(e.slot(), f,
+                  NumLive(EntityKind::kCell) > 0 ? 4 : 2);  // solids: most edges have four and more
   if (before < 2) CountBoundary(e, before == 0 ? +1 : -1);
 }
 

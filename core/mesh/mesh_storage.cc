@@ -123,11 +123,13 @@ std::vector<std::pair<std::string, size_t>> Mesh::MemoryByArray() const {
     arrays.emplace_back(name + " slots", slots_[k].memory_bytes());
     arrays.emplace_back(name + " changed", changed_[k].memory_bytes());
     arrays.emplace_back(name + " flags", Bytes(flags_[k]));
-    arrays.emplace_back(name + " boundary", boundary_[k].memory_bytes() + (k < 2 ? Bytes(boundary_uses_[k]) : 0));
+    arrays.emplace_back(name + " boundary",
+                        boundary_[k].memory_bytes() + (k < 2 ? Bytes(boundary_uses_[k]) : 0));
   }
   for (Relation relation : kStorableRelations) {
-    arrays.emplace_back(absl::StrCat(EntityKindName(relation.from), "->", EntityKindName(relation.to), " stored"),
-                        stored_.memory_bytes(relation));
+    arrays.emplace_back(
+        absl::StrCat(EntityKindName(relation.from), "->", EntityKindName(relation.to), " stored"),
+        stored_.memory_bytes(relation));
   }
   for (const AttributeColumn& column : attributes_) {
     arrays.emplace_back("attribute " + column.spec().name, column.memory_bytes());

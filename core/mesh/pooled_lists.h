@@ -12,8 +12,8 @@
 
 namespace dynmesh {
 
-/// Many small lists in one pool, a list for each slot. Lists are contiguous; a list that outgrows its room moves to a
-/// larger one, and rooms are recycled by size class, so no list has a heap block of its own.
+/// Many small lists in one pool, a list for each slot. Lists are contiguous; a list that outgrows its room
+/// moves to a larger one, and rooms are recycled by size class, so no list has a heap block of its own.
 ///
 /// Cost: PushBack and PopBack amortised O(1). Invalidates: both invalidate all spans.
 /// Thread safety: that of std::vector.
@@ -46,7 +46,8 @@ class PooledLists {
   void PushBack(Slot slot, T value, uint32_t first_room = 2) {
     if (slot >= lists_.size()) lists_.resize(slot + 1);
     const uint32_t size_class = lists_[slot].size_class;
-    if (lists_[slot].length == Capacity(size_class)) Move(slot, size_class == 0 ? first_room : NextClass(size_class));
+    if (lists_[slot].length == Capacity(size_class))
+      Move(slot, size_class == 0 ? first_room : NextClass(size_class));
     List& list = lists_[slot];
     pool_[list.offset + list.length++] = value;
     longest_ = std::max<uint32_t>(longest_, list.length);
@@ -70,7 +71,8 @@ class PooledLists {
     Move(slot, 0);
   }
 
-  /// Makes empty lists 0, 1, ... with room for `lengths` entries. REQUIRES: no list yet; fewer than kMaxEntries in all.
+  /// Makes empty lists 0, 1, ... with room for `lengths` entries. REQUIRES: no list yet; fewer than
+  /// kMaxEntries in all.
   void Layout(absl::Span<const uint32_t> lengths) {
     lists_.reserve(lengths.size() + lengths.size() / 16);
     lists_.resize(lengths.size());
@@ -170,7 +172,7 @@ class PooledLists {
 
   std::vector<List> lists_;
   std::vector<T> pool_ = std::vector<T>(kReadable);  ///< rooms, then kReadable entries of none
-  uint32_t longest_ = 0;  ///< length of the longest list so far
+  uint32_t longest_ = 0;                             ///< length of the longest list so far
   std::array<std::vector<uint32_t>, kNumClasses> free_rooms_;
 };
 

@@ -15,9 +15,9 @@ struct Relation {
 
 /// The relations that can be stored instead of being worked out on demand (paper, section 4).
 inline constexpr Relation kStorableRelations[] = {
-    {EntityKind::kCell, EntityKind::kEdge},   {EntityKind::kVertex, EntityKind::kCell},
-    {EntityKind::kEdge, EntityKind::kCell},   {EntityKind::kVertex, EntityKind::kFace},
-    {EntityKind::kCell, EntityKind::kCell},   {EntityKind::kVertex, EntityKind::kVertex},
+    {EntityKind::kCell, EntityKind::kEdge}, {EntityKind::kVertex, EntityKind::kCell},
+    {EntityKind::kEdge, EntityKind::kCell}, {EntityKind::kVertex, EntityKind::kFace},
+    {EntityKind::kCell, EntityKind::kCell}, {EntityKind::kVertex, EntityKind::kVertex},
 };
 inline constexpr int kNumStorableRelations = 6;
 

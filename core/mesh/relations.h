@@ -35,8 +35,8 @@ struct CsrTable {
 namespace internal {
 
 template <typename Fn>
-void ForEachStoredRow(const Mesh& mesh, Relation relation, const StoredRows& stored, absl::Span<const Slot> slots,
-                      RowBlock& block, Fn& fn) {
+void ForEachStoredRow(const Mesh& mesh, Relation relation, const StoredRows& stored,
+                      absl::Span<const Slot> slots, RowBlock& block, Fn& fn) {
   for (Slot slot : slots) {
     if (!stored.IsOpen(slot)) {
       fn(slot, stored.Row(slot));
@@ -66,8 +66,8 @@ void ForEachRow(const Mesh& mesh, Relation relation, absl::Span<const Slot> slot
 
 }  // namespace internal
 
-/// Calls fn(slot, row) for each of `slots`, in order; a row is valid during the call. Nothing is gathered in between:
-/// the way to walk many rows. REQUIRES: all are live, fn does not change the mesh.
+/// Calls fn(slot, row) for each of `slots`, in order; a row is valid during the call. Nothing is gathered in
+/// between: the way to walk many rows. REQUIRES: all are live, fn does not change the mesh.
 template <typename Fn>
 void ForEachRow(const Mesh& mesh, Relation relation, absl::Span<const Slot> slots, Fn fn) {
   RowBlock block;

@@ -51,7 +51,8 @@ void RowBlock::Grow(size_t needed) {
   capacity_ = capacity;
 }
 
-/// One method for each way of gathering a row; they append to the block, then Finish() makes the row canonical.
+/// One method for each way of gathering a row; they append to the block, then Finish() makes the row
+/// canonical.
 class RowKernels {
  public:
   RowKernels(const Mesh& mesh, RowBlock& block) : mesh_(mesh), block_(block), plain_(mesh.IsPlain()) {}
@@ -94,7 +95,8 @@ class RowKernels {
     block_.size_ += ids.size();
   }
 
-  /// PushAll for a list of the mesh, most of which are short: eight entries at once, whatever there is of them.
+  /// PushAll for a list of the mesh, most of which are short: eight entries at once, whatever there is of
+  /// them.
   template <typename Id>
   void PushList(absl::Span<const Id> list) {
     static_assert(sizeof(Id) == sizeof(Slot));
@@ -156,7 +158,8 @@ class RowKernels {
   /// The neighbour of `v` in face `f` that is not `x`, in a mesh without degenerate faces.
   Slot OtherNeighbor(FaceId f, VertexId v, VertexId x) const {
     const VertexId* cycle = &mesh_.face_vertices_[size_t{f.slot()} * mesh_.face_stride_];
-    if (mesh_.FaceSize(f) == 3) return cycle[0].slot() ^ cycle[1].slot() ^ cycle[2].slot() ^ v.slot() ^ x.slot();
+    if (mesh_.FaceSize(f) == 3)
+      return cycle[0].slot() ^ cycle[1].slot() ^ cycle[2].slot() ^ v.slot() ^ x.slot();
     const int at = std::find(cycle, cycle + 4, v) - cycle;
     return cycle[(at + 1) % 4].slot() ^ cycle[(at + 3) % 4].slot() ^ x.slot();
   }
@@ -167,8 +170,8 @@ class RowKernels {
     Slot x, y;
   };
 
-  /// Each face at `v` once, in a mesh without degenerate faces. Every face is met by both its edges at `v` and kept
-  /// by one: what is not kept is overwritten, because a branch would be mispredicted half the time.
+  /// Each face at `v` once, in a mesh without degenerate faces. Every face is met by both its edges at `v`
+  /// and kept by one: what is not kept is overwritten, because a branch would be mispredicted half the time.
   absl::Span<const Corner> CornersAt(VertexId v) {
     size_t count = 0;
     for (EdgeId e : mesh_.IncidentEdges(v)) {
@@ -301,7 +304,8 @@ class RowKernels {
         });
       case EntityKind::kCell:
         return ForEach(slots, [&](Slot c) {
-          if (!plain_ || mesh_.Type(CellId(c)) != ElementType::kTetrahedron || !TetTets(c)) CellCells(CellId(c));
+          if (!plain_ || mesh_.Type(CellId(c)) != ElementType::kTetrahedron || !TetTets(c))
+            CellCells(CellId(c));
         });
     }
   }
@@ -355,8 +359,9 @@ class RowKernels {
       if (i + ahead < slots.size()) FetchFaceEdges(slots[i + ahead]);
       const ElementType type = mesh_.Type(CellId(slots[i]));
       const OrientedFace* faces = &mesh_.cell_faces_[size_t{slots[i]} * mesh_.cell_face_stride_];
-      out = type == ElementType::kTetrahedron ? TetEdges(faces, mesh_.face_edges_.data(), mesh_.face_stride_, out)
-                                              : EdgesOf(CellId(slots[i]), out);
+      out = type == ElementType::kTetrahedron
+                ? TetEdges(faces, mesh_.face_edges_.data(), mesh_.face_stride_, out)
+                : EdgesOf(CellId(slots[i]), out);
       block_.offsets_[i + 1] = out - begin;
     }
     block_.size_ = out - begin;
@@ -372,7 +377,9 @@ class RowKernels {
     return distance > slots.size() * kAhead;
   }
 
-  Slot FirstFace(Slot c) const { return mesh_.cell_faces_[size_t{c} * mesh_.cell_face_stride_].face().slot(); }
+  Slot FirstFace(Slot c) const {
+    return mesh_.cell_faces_[size_t{c} * mesh_.cell_face_stride_].face().slot();
+  }
 
   void FetchFaceEdges(Slot c) const {
     const OrientedFace* faces = &mesh_.cell_faces_[size_t{c} * mesh_.cell_face_stride_];

@@ -10,13 +10,13 @@
 
 namespace dynmesh {
 
-/// Rows of a relation for a block of entities, worked out together: one loop for each relation, memory fetched
-/// ahead, and results that stay in the cache until they are read.
+/// Rows of a relation for a block of entities, worked out together: one loop for each relation, memory
+/// fetched ahead, and results that stay in the cache until they are read.
 ///
-/// On meshes without duplicate and degenerate elements each neighbour is met in a way that tells whether it was met
-/// before (say: a tetrahedron at a vertex counts where the vertex that the face leaves out is the highest), so rows
-/// need no search for repeats; on others repeats are sorted out.
-/// Thread safety: that of std::vector; many blocks may read one mesh.
+/// On meshes without duplicate and degenerate elements each neighbour is met in a way that tells whether it
+/// was met before (say: a tetrahedron at a vertex counts where the vertex that the face leaves out is the
+/// highest), so rows need no search for repeats; on others repeats are sorted out. Thread safety: that of
+/// std::vector; many blocks may read one mesh.
 class RowBlock {
  public:
   static constexpr size_t kMaxRows = 256;

@@ -28,8 +28,8 @@ inline Lanes Load(const Slot* values) {
 
 inline void Store(Lanes lanes, Slot* values) { std::memcpy(values, &lanes, sizeof(lanes)); }
 
-/// sorted[k] = the value that k others are smaller than, kNoSlot where there is none: equal values fall on one place.
-/// No branch depends on a value, so nothing is mispredicted. REQUIRES: 1 <= count <= kRankSorted.
+/// sorted[k] = the value that k others are smaller than, kNoSlot where there is none: equal values fall on
+/// one place. No branch depends on a value, so nothing is mispredicted. REQUIRES: 1 <= count <= kRankSorted.
 inline void RankSort(const Slot* values, size_t count, Slot* sorted) {
   Slot ranks[kRankSorted];
   for (size_t at = 0; at < count; at += 8) {  // two registers share each value that is spread over lanes
@@ -83,8 +83,8 @@ inline void SortDistinct(Slot* values, size_t count) {
   for (size_t at = 0; at < count; at += 4) internal::Store(internal::Load(sorted + at), values + at);
 }
 
-/// Sorts, and drops repeats and every `self`; returns how many values are left. REQUIRES and Cost: as SortDistinct;
-/// kNoSlot for `self` drops nothing.
+/// Sorts, and drops repeats and every `self`; returns how many values are left. REQUIRES and Cost: as
+/// SortDistinct; kNoSlot for `self` drops nothing.
 inline size_t SortUnique(Slot* values, size_t count, Slot self = kNoSlot) {
   if (count > internal::kRankSorted) {
     Slot* const end = std::remove(values, values + count, self);

@@ -39,7 +39,8 @@ Axes Transpose(Axes x, int bits) {
   x[1] ^= x[0];
   x[2] ^= x[1];
   uint32_t gray = 0;
-  for (uint32_t q = uint32_t{1} << (bits - 1); q > 1; q >>= 1) gray ^= -static_cast<uint32_t>((x[2] & q) != 0) & (q - 1);
+  for (uint32_t q = uint32_t{1} << (bits - 1); q > 1; q >>= 1)
+    gray ^= -static_cast<uint32_t>((x[2] & q) != 0) & (q - 1);
   for (uint32_t& axis : x) axis ^= gray;
   return x;
 }
@@ -72,7 +73,8 @@ class Grid {
         high[axis] = std::max(high[axis], p[axis]);
       }
     }
-    for (int axis = 0; axis < 3; ++axis) half_extent_ = std::max(half_extent_, high[axis] / 2 - low_[axis] / 2);
+    for (int axis = 0; axis < 3; ++axis)
+      half_extent_ = std::max(half_extent_, high[axis] / 2 - low_[axis] / 2);
   }
 
   Axes Of(const Point& p) const {

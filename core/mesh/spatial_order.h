@@ -8,8 +8,8 @@
 #include "core/mesh/checksum.h"
 #include "core/mesh/ids.h"
 
-/// Orders in which things that are near in space are near in memory: slot order decides cache hits and the size
-/// of deltas more than anything else does.
+/// Orders in which things that are near in space are near in memory: slot order decides cache hits and the
+/// size of deltas more than anything else does.
 namespace dynmesh {
 
 /// order[k] = index of the k-th item.

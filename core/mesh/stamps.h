@@ -82,7 +82,8 @@ class StampColumn {
 
   /// No fewer than the slots whose stamp is greater than `since`: whole pages. Cost: O(pages).
   size_t BoundSince(Stamp since) const {
-    const auto pages = std::count_if(page_max_.begin(), page_max_.end(), [&](Stamp max) { return max > since; });
+    const auto pages =
+        std::count_if(page_max_.begin(), page_max_.end(), [&](Stamp max) { return max > since; });
     return std::min<size_t>(pages * kPageSlots, stamps_.size());
   }
 
@@ -95,9 +96,7 @@ class StampColumn {
   }
 
   Slot size() const { return stamps_.size(); }
-  size_t memory_bytes() const {
-    return (stamps_.size() + page_max_.size()) * sizeof(Stamp);
-  }
+  size_t memory_bytes() const { return (stamps_.size() + page_max_.size()) * sizeof(Stamp); }
 
  private:
   std::vector<Stamp> stamps_;

@@ -14,8 +14,8 @@ namespace dynmesh {
 
 class Mesh;
 
-/// The tables of a mesh that are stored at present, kept current by it: it tells of each entity that it links or
-/// unlinks. A part of Mesh.
+/// The tables of a mesh that are stored at present, kept current by it: it tells of each entity that it links
+/// or unlinks. A part of Mesh.
 class StoredRelations {
  public:
   bool any() const { return cell_edges_.has_value() || num_tables_ > 0; }
@@ -31,7 +31,8 @@ class StoredRelations {
   /// Whether `count` entries more have room within the 32-bit limits of every table.
   bool HasRoom(uint32_t count) const;
 
-  /// Fills a table from `mesh`. Errors: RESOURCE_EXHAUSTED. REQUIRES: the relation is storable and not stored.
+  /// Fills a table from `mesh`. Errors: RESOURCE_EXHAUSTED. REQUIRES: the relation is storable and not
+  /// stored.
   absl::Status Build(const Mesh& mesh, Relation relation);
   void Drop(Relation relation);
   /// Bytes of one table; 0 when it is not stored.
@@ -39,7 +40,8 @@ class StoredRelations {
 
   /// A slot has a new occupant, which nothing is linked to yet.
   void Begin(EntityId id);
-  /// The entity has just been linked, or is about to be unlinked. REQUIRES: its own downward arrays are valid.
+  /// The entity has just been linked, or is about to be unlinked. REQUIRES: its own downward arrays are
+  /// valid.
   void CellLinked(const Mesh& mesh, CellId c);
   void CellUnlinking(const Mesh& mesh, CellId c);
   void FaceLinked(const Mesh& mesh, FaceId f);

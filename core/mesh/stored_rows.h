@@ -15,10 +15,9 @@ namespace dynmesh {
 
 /// A relation kept as a table: for each slot its neighbours, ascending, each once.
 ///
-/// A row that would grow beyond kMaxRow is given up: it is *open*, and its readers work it out on demand. So a hub
-/// of a million neighbours costs its editors nothing, and a face of n cells no n^2 entries.
-/// Cost: Insert and Erase linear in the row.
-/// Thread safety: that of std::vector.
+/// A row that would grow beyond kMaxRow is given up: it is *open*, and its readers work it out on demand. So
+/// a hub of a million neighbours costs its editors nothing, and a face of n cells no n^2 entries. Cost:
+/// Insert and Erase linear in the row. Thread safety: that of std::vector.
 class StoredRows {
  public:
   static constexpr uint32_t kMaxRow = 512;
@@ -101,7 +100,8 @@ class CellEdgeRows {
   size_t memory_bytes() const { return edges_.size() * sizeof(Slot) + lengths_.size(); }
 
  private:
-  /// The first cell sets the stride; one of another type makes rows as long as the longest, with lengths beside.
+  /// The first cell sets the stride; one of another type makes rows as long as the longest, with lengths
+  /// beside.
   void PrepareFor(size_t length) {
     if (stride_ == 0) {
       stride_ = length;
@@ -111,7 +111,8 @@ class CellEdgeRows {
     if (lengths_.empty()) lengths_.assign(num_rows, stride_);
     if (length < stride_) return;
     std::vector<Slot> wide(num_rows * length, kNoSlot);
-    for (size_t row = 0; row < num_rows; ++row) std::copy_n(&edges_[row * stride_], stride_, &wide[row * length]);
+    for (size_t row = 0; row < num_rows; ++row)
+      std::copy_n(&edges_[row * stride_], stride_, &wide[row * length]);
     edges_ = std::move(wide);
     stride_ = length;
   }

@@ -20,12 +20,13 @@ class MeshValidator {
     using Check = void (MeshValidator::*)();
     constexpr Check kDownward[] = {&MeshValidator::CheckEdges, &MeshValidator::CheckFaces,
                                    &MeshValidator::CheckCells};
-    constexpr Check kRest[] = {
-        &MeshValidator::CheckVertexEdges, &MeshValidator::CheckEdgeFaces,    &MeshValidator::CheckFaceCells,
-        &MeshValidator::CheckHubEdges,    &MeshValidator::CheckHubFaces,     &MeshValidator::CheckPrimaryEdges,
-        &MeshValidator::CheckPrimaryFaces, &MeshValidator::CheckBoundary,    &MeshValidator::CheckCountsAndStamps,
-        &MeshValidator::CheckDegenerate,  &MeshValidator::CheckStoredRelations, &MeshValidator::CheckAttributes,
-        &MeshValidator::CheckChecksum};
+    constexpr Check kRest[] = {&MeshValidator::CheckVertexEdges,     &MeshValidator::CheckEdgeFaces,
+                               &MeshValidator::CheckFaceCells,       &MeshValidator::CheckHubEdges,
+                               &MeshValidator::CheckHubFaces,        &MeshValidator::CheckPrimaryEdges,
+                               &MeshValidator::CheckPrimaryFaces,    &MeshValidator::CheckBoundary,
+                               &MeshValidator::CheckCountsAndStamps, &MeshValidator::CheckDegenerate,
+                               &MeshValidator::CheckStoredRelations, &MeshValidator::CheckAttributes,
+                               &MeshValidator::CheckChecksum};
     for (Check check : kDownward) {
       if (options_.goes_on()) (this->*check)();
     }
@@ -397,7 +398,8 @@ class MeshValidator {
     const auto stored = rows != nullptr ? rows->Row(slot) : mesh_.stored().cell_edges()->Row(slot);
     block_.Gather(mesh_, relation, {&slot, 1});
     if (stored == block_.Row(0)) return;
-    Report("stored row ", EntityKindName(relation.from), " ", slot, " -> ", EntityKindName(relation.to), " is wrong");
+    Report("stored row ", EntityKindName(relation.from), " ", slot, " -> ", EntityKindName(relation.to),
+           " is wrong");
   }
 
   void CheckAttributes() {

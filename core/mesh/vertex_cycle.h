@@ -23,9 +23,7 @@ struct FaceCode {
   /// Position in the stored face of the key's vertex k.
   constexpr int StoredVertex(int k, int n) const { return (rotation() + (flipped() ? n - k : k)) % n; }
   /// Position in the stored face of the key's edge k, which joins key vertices k and k + 1.
-  constexpr int StoredEdge(int k, int n) const {
-    return (rotation() + (flipped() ? n - k - 1 : k)) % n;
-  }
+  constexpr int StoredEdge(int k, int n) const { return (rotation() + (flipped() ? n - k - 1 : k)) % n; }
   /// The code by which the stored face lies in the key.
   constexpr FaceCode Inverse(int n) const {
     return flipped() ? *this : FaceCode{static_cast<uint8_t>((n - rotation()) % n)};
@@ -45,8 +43,8 @@ inline bool HasRepeats(absl::Span<const VertexId> vertices) {
 /// How `stored` lies against `key`, or nullopt if they are not the same cycle.
 absl::optional<FaceCode> MatchFace(absl::Span<const VertexId> stored, absl::Span<const VertexId> key);
 
-/// A cycle of up to four vertices in a form that is the same for every rotation and reflection: the smallest of
-/// them, padded with invalid ids. Of an edge: its ends, sorted.
+/// A cycle of up to four vertices in a form that is the same for every rotation and reflection: the smallest
+/// of them, padded with invalid ids. Of an edge: its ends, sorted.
 using CycleKey = std::array<VertexId, kMaxFaceVertices>;
 CycleKey CanonicalCycle(absl::Span<const VertexId> cycle);
 

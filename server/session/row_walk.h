@@ -13,11 +13,11 @@ namespace dynmesh {
 
 /// Rows of neighbours whose cost is known before it arises.
 ///
-/// A row may take far more steps than it has entries: of an edge with 100,000 dangling faces each is asked for
-/// its cells, and there are none. So the lengths of the lists on the way are added up and charged first. A short
-/// row is then gathered by GetNeighbors; a long one here, list by list, with the neighbours marked in a bit
-/// set: so it can stop on the way and needs no memory for those that it meets twice.
-/// Thread safety: that of std::vector.
+/// A row may take far more steps than it has entries: of an edge with 100,000 dangling faces each is asked
+/// for its cells, and there are none. So the lengths of the lists on the way are added up and charged first.
+/// A short row is then gathered by GetNeighbors; a long one here, list by list, with the neighbours marked in
+/// a bit set: so it can stop on the way and needs no memory for those that it meets twice. Thread safety:
+/// that of std::vector.
 class RowWalk {
  public:
   static constexpr uint64_t kLongRow = uint64_t{1} << 16;

@@ -68,10 +68,12 @@ Mesh ByDimension(const Mesh& mesh) {
 }
 
 std::vector<Edit> EditsOf(const Mesh& mesh) {
+  constexpr size_t kFew = 16;  // vertices of one edit, so that they keep their order
   std::vector<Edit> edits;
   AddVerticesEdit vertices;
   mesh.slots(EntityKind::kVertex).live().ForEach([&](Slot slot) {
     vertices.positions.push_back(mesh.Position(VertexId(slot)));
+    if (vertices.positions.size() == kFew) edits.push_back(std::exchange(vertices, {}));
   });
   edits.push_back(vertices);
   ForEachElement(mesh, [&](EntityId id) {

@@ -58,7 +58,8 @@ class Daemon {
 /// A mesh of the same vertices and elements, added by ascending dimension: what an import makes of them.
 Mesh ByDimension(const Mesh& mesh);
 
-/// Edits that put the vertices and elements of `mesh` into an empty session, by ascending dimension.
+/// Edits that put the vertices and elements of `mesh` into an empty session, by ascending dimension. Ids become those
+/// of ByDimension(mesh).
 std::vector<Edit> EditsOf(const Mesh& mesh);
 
 /// Fails the test when refused.

@@ -35,12 +35,24 @@ absl::StatusOr<Mesh> MeshBuilder::Build(StagedMesh staged) {
   DYNMESH_RETURN_IF_ERROR(CheckMemory(builder.memory_bytes()));
   absl::StatusOr<BulkResult> result = std::move(builder).Finish();
   if (!result.ok()) return WithImportIndex(result.status());
-  for (EntityId id : result->degenerate) warnings_.Add(WarningKind::kDegenerateElement, id);
-  for (EntityId id : result->duplicate) warnings_.Add(WarningKind::kDuplicateElement, id);
+  CollectWarnings(*result);
   DYNMESH_RETURN_IF_ERROR(CheckMemory(result->mesh.memory_bytes()));
   for (StagedColumn& column : staged.columns()) DYNMESH_RETURN_IF_ERROR(AddColumn(column, result->mesh));
   DYNMESH_RETURN_IF_ERROR(result->mesh.Commit());
   return std::move(result->mesh);
+}
+
+void MeshBuilder::CollectWarnings(const BulkResult& result) {
+  auto degenerate = result.degenerate.begin();
+  for (EntityId id : result.duplicate) {
+    for (; degenerate != result.degenerate.end() && *degenerate <= id; ++degenerate) {
+      warnings_.Add(WarningKind::kDegenerateElement, *degenerate);
+    }
+    warnings_.Add(WarningKind::kDuplicateElement, id);
+  }
+  for (; degenerate != result.degenerate.end(); ++degenerate) {
+    warnings_.Add(WarningKind::kDegenerateElement, *degenerate);
+  }
 }
 
 absl::Status MeshBuilder::AddVertices(ByteQueue& positions, BulkBuilder& builder) {
@@ -81,7 +93,8 @@ absl::Status MeshBuilder::WithImportIndex(const absl::Status& status) const {
   if (!detail || !absl::SimpleAtoi(detail->Find("position"), &position)) return status;
   for (const RunPlace& place : places_) {
     if (EntityKindName(place.kind) != detail->Find("kind")) continue;
-    if (position < place.count) return WithMetadata(status, "index", absl::StrCat(place.first_index + position));
+    if (position < place.count)
+      return WithMetadata(status, "index", absl::StrCat(place.first_index + position));
     position -= place.count;
   }
   return status;
@@ -106,7 +119,9 @@ absl::Status MeshBuilder::AddColumn(StagedColumn& column, Mesh& mesh) {
 absl::Status MeshBuilder::OnProgress(uint64_t done, uint64_t total) {
   DYNMESH_RETURN_IF_ERROR(CheckCancelled());
   // What a builder counts are passes over elements; the peer is told of vertices and elements.
-  monitor_.OnProgress(static_cast<uint64_t>(static_cast<double>(done) / std::max<uint64_t>(total, 1) * total_), total_);
+  const double share = static_cast<double>(done) / std::max<uint64_t>(total, 1);
+  const uint64_t items = static_cast<uint64_t>(share * total_);
+  if (items > reported_) monitor_.OnProgress(reported_ = items, total_);
   return absl::OkStatus();
 }
 

@@ -30,8 +30,8 @@ class MeshBuilder {
   MeshBuilder(const MeshOptions& options, const Limits& limits, ImportMonitor& monitor)
       : mesh_options_(options), limits_(limits), monitor_(monitor) {}
 
-  /// Errors: INVALID_ARGUMENT UNKNOWN_ENTITY (a vertex id out of range; metadata index, ids), DUPLICATE_ELEMENT (if so
-  /// opted; metadata index); RESOURCE_EXHAUSTED LIMIT_EXCEEDED; CANCELLED.
+  /// Errors: INVALID_ARGUMENT UNKNOWN_ENTITY (a vertex id out of range; metadata index, ids),
+  /// DUPLICATE_ELEMENT (if so opted; metadata index); RESOURCE_EXHAUSTED LIMIT_EXCEEDED; CANCELLED.
   absl::StatusOr<Mesh> Build(StagedMesh staged);
 
   /// Of the mesh that Build made.
@@ -48,6 +48,7 @@ class MeshBuilder {
   absl::Status AddVertices(ByteQueue& positions, BulkBuilder& builder);
   absl::Status AddRun(StagedRun& run, BulkBuilder& builder);
   absl::Status AddColumn(StagedColumn& column, Mesh& mesh);
+  void CollectWarnings(const BulkResult& result);
   absl::Status OnProgress(uint64_t done, uint64_t total);
   absl::Status CheckCancelled() const;
   absl::Status CheckMemory(uint64_t bytes) const;
@@ -61,6 +62,7 @@ class MeshBuilder {
   std::vector<RunPlace> places_;
   uint64_t num_vertices_ = 0;
   uint64_t total_ = 0;
+  uint64_t reported_ = 0;
 };
 
 }  // namespace dynmesh

@@ -52,7 +52,8 @@ AddElementsEdit AllCells(const Mesh& mesh) {
 TEST(TransactionTest, ManyItemsGetSlotsInSpatialOrderAndAnswersInTheirOwn) {
   const Mesh source = TetGrid(5, 5, 5);
   AddVerticesEdit vertices;
-  for (Slot v = 0; v < source.NumLive(EntityKind::kVertex); ++v) vertices.positions.push_back(source.Position(VertexId(v)));
+  for (Slot v = 0; v < source.NumLive(EntityKind::kVertex); ++v)
+    vertices.positions.push_back(source.Position(VertexId(v)));
   AddElementsEdit cells = AllCells(source);
   for (Slot& v : cells.vertices) v |= kNewVertex;
   Mesh mesh;
@@ -68,7 +69,8 @@ TEST(TransactionTest, ManyItemsGetSlotsInSpatialOrderAndAnswersInTheirOwn) {
   }
   for (size_t i = 0; i < new_cells.size(); ++i) {
     for (int k = 0; k < 4; ++k) {
-      EXPECT_EQ(mesh.Vertices(CellId(new_cells[i]))[k].slot(), new_vertices[cells.vertices[4 * i + k] & ~kNewVertex]);
+      EXPECT_EQ(mesh.Vertices(CellId(new_cells[i]))[k].slot(),
+                new_vertices[cells.vertices[4 * i + k] & ~kNewVertex]);
     }
   }
   ExpectEqualsOracle(mesh, ModelOf(mesh));
@@ -203,13 +205,16 @@ TEST(TransactionTest, AFaceThatBecameAnElementAgainIsAnotherElement) {
   ASSERT_TRUE(apply(triangle, 3).ok());
   EXPECT_EQ(ErrorReason(apply(remove, 2).status()), reason::kEntityRemoved);
   EXPECT_TRUE(apply(remove, 4).ok());
-  EXPECT_EQ(ErrorReason(ApplyBatch(mesh, std::vector<Edit>{triangle, remove}, {}).status()), reason::kEntityRemoved)
+  EXPECT_EQ(ErrorReason(ApplyBatch(mesh, std::vector<Edit>{triangle, remove}, {}).status()),
+            reason::kEntityRemoved)
       << "made in the same batch";
 }
 
 TEST(TransactionTest, BadKindsAndValuesAreNamed) {
   Mesh mesh = OneTet();
-  const auto refusal = [&](Edit edit) { return ApplyBatch(mesh, std::vector<Edit>{std::move(edit)}, {}).status(); };
+  const auto refusal = [&](Edit edit) {
+    return ApplyBatch(mesh, std::vector<Edit>{std::move(edit)}, {}).status();
+  };
   const EntityKind bad = static_cast<EntityKind>(9);
   EXPECT_EQ(ErrorReason(refusal(RemoveElementsEdit{bad, {0}})), reason::kBadEntityKind);
   EXPECT_EQ(ErrorReason(refusal(SetAttributeEdit{{"x", bad, AttributeType::kInt32, 1}, {0}, {0, 0, 0, 0}})),
@@ -241,10 +246,11 @@ TEST(TransactionTest, AnEmptyBatchIsNoRevision) {
 
 TEST(TransactionTest, DegenerateAndDuplicateElementsAreReported) {
   Mesh mesh = OneTet();
-  const auto result = ApplyBatch(mesh,
-                                 std::vector<Edit>{AddElementsEdit{ElementType::kTetrahedron, {0, 1, 2, 2, 3, 2, 1, 0}},
-                                                   AddElementsEdit{ElementType::kTriangle, {0, 1, 2, 2, 1, 0}}},
-                                 {});
+  const auto result =
+      ApplyBatch(mesh,
+                 std::vector<Edit>{AddElementsEdit{ElementType::kTetrahedron, {0, 1, 2, 2, 3, 2, 1, 0}},
+                                   AddElementsEdit{ElementType::kTriangle, {0, 1, 2, 2, 1, 0}}},
+                 {});
   ASSERT_TRUE(result.ok());
   EXPECT_THAT(result->degenerate, ElementsAre(EntityId(CellId(1))));
   ASSERT_EQ(result->duplicate.size(), 2u);

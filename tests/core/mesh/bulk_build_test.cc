@@ -80,7 +80,8 @@ BulkResult Build(const Input& input, SlotOrder order = SlotOrder::kCaller) {
 Input Reordered(const Input& input, const BulkResult& result) {
   Input sorted;
   sorted.positions.resize(input.positions.size());
-  for (size_t i = 0; i < input.positions.size(); ++i) sorted.positions[result.slots[0][i]] = input.positions[i];
+  for (size_t i = 0; i < input.positions.size(); ++i)
+    sorted.positions[result.slots[0][i]] = input.positions[i];
   for (EntityKind kind : {EntityKind::kEdge, EntityKind::kFace, EntityKind::kCell}) {
     const Permutation& slots = result.slots[Dimension(kind)];
     std::vector<ElementModel::Element> elements(slots.size());
@@ -207,7 +208,9 @@ TEST(BulkBuildTest, EditsAfterABulkBuildWorkAsAfterAnyOther) {
 
 // ---- Refusals ----
 
-absl::Status RefusedWith(const Input& input, const BulkOptions& options) { return TryBuild(input, options).status(); }
+absl::Status RefusedWith(const Input& input, const BulkOptions& options) {
+  return TryBuild(input, options).status();
+}
 
 TEST(BulkBuildTest, ARefusedDuplicateIsNamed) {
   BulkOptions options;
@@ -264,7 +267,9 @@ TEST(BulkBuildTest, ProgressGrowsToTheTotalAndCanEndTheBuild) {
   EXPECT_GT(calls, 3);
   EXPECT_EQ(last, total);
   int left = 2;
-  options.progress = [&](uint64_t, uint64_t) { return --left > 0 ? absl::OkStatus() : absl::CancelledError(); };
+  options.progress = [&](uint64_t, uint64_t) {
+    return --left > 0 ? absl::OkStatus() : absl::CancelledError();
+  };
   EXPECT_EQ(RefusedWith(input, options).code(), absl::StatusCode::kCancelled);
 }
 

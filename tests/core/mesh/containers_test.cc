@@ -55,7 +55,8 @@ TEST(BitSetTest, ListsAndCollectsItsMembersWhateverTheirDensity) {
     for (size_t step : {1u, 63u, 64u, 65u, 1000u}) {
       std::vector<Slot> collected;
       std::vector<Slot> part(step);
-      for (Slot next = 0; const size_t count = set.Collect(next, part.data(), step); next = part[count - 1] + 1) {
+      for (Slot next = 0; const size_t count = set.Collect(next, part.data(), step);
+           next = part[count - 1] + 1) {
         collected.insert(collected.end(), part.begin(), part.begin() + count);
       }
       ASSERT_EQ(collected, expected) << "one in " << one_in << " step " << step;

@@ -1,5 +1,5 @@
-// Meshes that are bad for naive data structures. None of this is timed: what takes quadratic time or deep recursion
-// here does not end within the limit of the test runner.
+// Meshes that are bad for naive data structures. None of this is timed: what takes quadratic time or deep
+// recursion here does not end within the limit of the test runner.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -74,7 +74,7 @@ Mesh OneByOne(const Input& input) {
 }
 
 /// Removes every second element, then the rest, each a batch that could be rolled back.
-void TearDown(EntityKind kind, Mesh& mesh) {
+void RemoveAll(EntityKind kind, Mesh& mesh) {
   for (int parity : {0, 1}) {
     std::vector<Slot> doomed;
     mesh.slots(kind).live().ForEach([&](Slot slot) {
@@ -105,32 +105,34 @@ TEST_P(ExtremesTest, AMillionTrianglesRoundAVertex) {
   EXPECT_EQ(RowLength(mesh, {EntityKind::kVertex, EntityKind::kFace}, 0), kCone);
   EXPECT_EQ(RowLength(mesh, {EntityKind::kVertex, EntityKind::kVertex}, 0), kCone);
   EXPECT_EQ(mesh.Boundary(EntityKind::kEdge).size(), kCone);
-  TearDown(EntityKind::kFace, mesh);
+  RemoveAll(EntityKind::kFace, mesh);
 }
 
 TEST_P(ExtremesTest, ABookOfFacesOnAnEdge) {
   Mesh mesh = Build(OnEdge(kBook, ElementType::kTriangle));
-  EXPECT_EQ(RowLength(mesh, {EntityKind::kEdge, EntityKind::kFace}, mesh.FindEdge(VertexId(0), VertexId(1)).slot()),
-            kBook);
+  EXPECT_EQ(
+      RowLength(mesh, {EntityKind::kEdge, EntityKind::kFace}, mesh.FindEdge(VertexId(0), VertexId(1)).slot()),
+      kBook);
   EXPECT_EQ(RowLength(mesh, {EntityKind::kFace, EntityKind::kFace}, 7), kBook - 1);
   EXPECT_THAT(Validate(mesh), ::testing::IsEmpty());
-  TearDown(EntityKind::kFace, mesh);
+  RemoveAll(EntityKind::kFace, mesh);
 }
 
 TEST_P(ExtremesTest, AWheelOfTetrahedraOnAnEdge) {
   Mesh mesh = Build(OnEdge(kBook, ElementType::kTetrahedron));
-  EXPECT_EQ(RowLength(mesh, {EntityKind::kEdge, EntityKind::kCell}, mesh.FindEdge(VertexId(0), VertexId(1)).slot()),
-            kBook);
+  EXPECT_EQ(
+      RowLength(mesh, {EntityKind::kEdge, EntityKind::kCell}, mesh.FindEdge(VertexId(0), VertexId(1)).slot()),
+      kBook);
   EXPECT_EQ(RowLength(mesh, {EntityKind::kVertex, EntityKind::kCell}, 0), kBook);
   EXPECT_EQ(mesh.Boundary(EntityKind::kFace).size(), 2 * kBook);
   EXPECT_THAT(Validate(mesh), ::testing::IsEmpty());
-  TearDown(EntityKind::kCell, mesh);
+  RemoveAll(EntityKind::kCell, mesh);
 }
 
 TEST_P(ExtremesTest, HubsKeepStoredRelationsInLinearTime) {
   Mesh mesh = Build(OnEdge(kBook, ElementType::kTetrahedron));
   for (Relation relation : kStorableRelations) ASSERT_TRUE(mesh.StoreRelation(relation, true).ok());
-  TearDown(EntityKind::kCell, mesh);
+  RemoveAll(EntityKind::kCell, mesh);
   AddAll(OnEdge(kBook, ElementType::kTetrahedron), mesh);
   Commit(mesh);
   EXPECT_EQ(RowLength(mesh, {EntityKind::kVertex, EntityKind::kCell}, 0), kBook);
@@ -143,20 +145,21 @@ INSTANTIATE_TEST_SUITE_P(Builds, ExtremesTest, ::testing::Bool(),
 TEST(ExtremesLimitsTest, AMeshEmptiedAndRefilledTenTimesUsesItsMemoryAgain) {
   const Mesh source = TetGrid(14, 14, 14);
   Input cells{{}, ElementType::kTetrahedron, {}};
-  for (Slot v = 0; v < source.NumLive(EntityKind::kVertex); ++v) cells.positions.push_back(source.Position(VertexId(v)));
+  for (Slot v = 0; v < source.NumLive(EntityKind::kVertex); ++v)
+    cells.positions.push_back(source.Position(VertexId(v)));
   source.slots(EntityKind::kCell).live().ForEach([&](Slot c) {
     const auto vertices = source.Vertices(CellId(c));
     cells.vertices.insert(cells.vertices.end(), vertices.begin(), vertices.end());
   });
   Mesh mesh = OneByOne(cells);
-  TearDown(EntityKind::kCell, mesh);
+  RemoveAll(EntityKind::kCell, mesh);
   AddAll(cells, mesh);
   Commit(mesh);
   const size_t once = mesh.memory_bytes();
   std::array<Slot, kNumEntityKinds> limits;
   for (EntityKind kind : kEntityKinds) limits[Dimension(kind)] = mesh.slots(kind).limit();
   for (int round = 0; round < 10; ++round) {
-    TearDown(EntityKind::kCell, mesh);
+    RemoveAll(EntityKind::kCell, mesh);
     AddAll(cells, mesh);
     Commit(mesh);
   }
@@ -172,7 +175,8 @@ TEST(ExtremesLimitsTest, ListsThatReachTheir32BitLimitsAreRefusedByName) {
   AddVertices(mesh, 10);
   Add(mesh, ElementType::kTetrahedron, {0, 1, 2, 3});
   const absl::Status status =
-      mesh.AddElement(ElementType::kTetrahedron, {VertexId(4), VertexId(5), VertexId(6), VertexId(7)}).status();
+      mesh.AddElement(ElementType::kTetrahedron, {VertexId(4), VertexId(5), VertexId(6), VertexId(7)})
+          .status();
   EXPECT_EQ(status.code(), absl::StatusCode::kResourceExhausted);
   EXPECT_EQ(GetErrorDetail(status)->Find("limit"), "max_edges");
   EXPECT_THAT(Validate(mesh), ::testing::IsEmpty());

@@ -169,14 +169,15 @@ RandomEditOptions Only(std::vector<ElementType> types) {
 
 INSTANTIATE_TEST_SUITE_P(
     Mixes, MeshRandomTest,
-    ::testing::Values(Mix{"Everything", {}}, Mix{"Piles", Piles()}, Mix{"Tets", Only({ElementType::kTetrahedron})},
+    ::testing::Values(Mix{"Everything", {}}, Mix{"Piles", Piles()},
+                      Mix{"Tets", Only({ElementType::kTetrahedron})},
                       Mix{"Hexes", Only({ElementType::kHexahedron})},
-                      Mix{"Hybrid", Only({ElementType::kTetrahedron, ElementType::kPyramid, ElementType::kPrism,
-                                          ElementType::kHexahedron})},
+                      Mix{"Hybrid", Only({ElementType::kTetrahedron, ElementType::kPyramid,
+                                          ElementType::kPrism, ElementType::kHexahedron})},
                       Mix{"Surfaces", Only({ElementType::kTriangle, ElementType::kQuad})},
                       Mix{"Wires", Only({ElementType::kWireEdge})},
-                      Mix{"TetsAndDanglers", Only({ElementType::kTetrahedron, ElementType::kTriangle,
-                                                   ElementType::kWireEdge})}),
+                      Mix{"TetsAndDanglers",
+                          Only({ElementType::kTetrahedron, ElementType::kTriangle, ElementType::kWireEdge})}),
     [](const auto& mix) { return mix.param.name; });
 
 }  // namespace

@@ -106,7 +106,8 @@ TEST(RelationsTest, CellsOfManyTypesKeepTheirStoredEdges) {
   ASSERT_TRUE(mesh.StoreRelation(kStorableRelations[0], true).ok());
   EXPECT_THAT(Validate(mesh), IsEmpty());
   const auto vertices = mesh.Vertices(CellId(0));
-  ASSERT_TRUE(mesh.AddElement(mesh.Type(CellId(0)), std::vector<VertexId>(vertices.begin(), vertices.end())).ok());
+  ASSERT_TRUE(
+      mesh.AddElement(mesh.Type(CellId(0)), std::vector<VertexId>(vertices.begin(), vertices.end())).ok());
   EXPECT_THAT(Validate(mesh), IsEmpty());
 }
 
@@ -124,7 +125,8 @@ Mesh Sheaf(int n) {
 void ExpectStoredEqualsOnDemand(Mesh& mesh, Relation relation) {
   ASSERT_TRUE(mesh.stored().Has(relation));
   std::vector<std::vector<Slot>> stored;
-  ForEachRow(mesh, relation, [&](Slot, absl::Span<const Slot> row) { stored.emplace_back(row.begin(), row.end()); });
+  ForEachRow(mesh, relation,
+             [&](Slot, absl::Span<const Slot> row) { stored.emplace_back(row.begin(), row.end()); });
   ASSERT_TRUE(mesh.StoreRelation(relation, false).ok());
   size_t i = 0;
   ForEachRow(mesh, relation, [&](Slot slot, absl::Span<const Slot> row) {
