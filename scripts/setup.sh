@@ -18,7 +18,7 @@ test_packages=(
   libgtest-dev libgmock-dev python3-pytest python3-hypothesis python3-vtk9 draco
 )
 demo_packages=(gmsh python3-matplotlib python3-pil)
-bench_packages=(libbenchmark-dev)
+bench_packages=(libbenchmark-dev libcgal-dev libopenmesh-dev libvtk9-dev python3-numpy python3-meshio)
 
 groups=("$@")
 [ ${#groups[@]} -gt 0 ] || groups=(build test demo)
