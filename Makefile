@@ -3,12 +3,13 @@
 
 JOBS ?= $(shell nproc)
 
-.PHONY: help demo test configure sanitize asan tsan image-test clean
+.PHONY: help demo test configure sanitize asan tsan bench image-test clean
 
 help:
 	@echo "make demo [MESH=path]  set up, build, and drag a hole through a real mesh with four followers"
 	@echo "make test              set up, build, and run all tests"
 	@echo "make sanitize          the tests under AddressSanitizer + UBSan, and core under ThreadSanitizer"
+	@echo "make bench [MESHES=dir] time core against flat arrays and other libraries (quiet machine, 20 minutes)"
 	@echo "make image-test        build the container image and make one edit through it"
 	@echo "make clean             remove build/"
 
@@ -37,6 +38,10 @@ define sanitize_with
 scripts/setup.sh build test && cmake --preset $(1) > /dev/null && \
 cmake --build --preset $(1) -j $(JOBS) && ctest --preset $(1)
 endef
+
+bench:
+	@scripts/setup.sh server bench
+	@MESHES="$(MESHES)" tests/bench/run.sh
 
 image-test: configure
 	@cmake --build --preset dev -j $(JOBS) --target dynmesh_python

@@ -1,6 +1,7 @@
 #include "tests/bench/arguments.h"
 
 #include <benchmark/benchmark.h>
+#include <malloc.h>
 
 #include <algorithm>
 #include <iostream>
@@ -19,11 +20,21 @@ MeshInput InputOfArguments(int& argc, char** argv) {
   std::rotate(argv + 1, argv + 3, argv + argc);
   argc -= 2;
   MeshInput input = Must(ReadMeshInput(source));
+  DescribeInput(input, order);
   if (order == "hilbert") return HilbertSorted(input);
   return source.find(':') != std::string::npos ? Shuffled(input) : input;
 }
 
+void DescribeInput(const MeshInput& input, const std::string& order) {
+  benchmark::AddCustomContext("type", std::string(ElementTypeName(input.type)));
+  benchmark::AddCustomContext("elements", std::to_string(input.num_elements()));
+  benchmark::AddCustomContext("vertices", std::to_string(input.points.size()));
+  benchmark::AddCustomContext("order", order);
+}
+
 int RunBenchmarks(int argc, char** argv) {
+  // Large arrays always come from new pages: else what was freed before decides who gets warm ones.
+  mallopt(M_MMAP_THRESHOLD, 128 << 10);
   benchmark::Initialize(&argc, argv);
   if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 2;
   benchmark::RunSpecifiedBenchmarks();

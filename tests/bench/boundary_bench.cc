@@ -13,16 +13,22 @@
 namespace dynmesh::bench {
 namespace {
 
-/// The sum of the members, by blocks that stay in the cache.
-uint64_t SumCollected(const BitSet& set) {
+/// Calls fn(id) for each member, by blocks that stay in the cache.
+template <typename Fn>
+void ForEachCollected(const BitSet& set, Fn fn) {
   std::array<Slot, 1024> block;
-  uint64_t sum = 0;
   for (Slot next = 0;;) {
     const size_t count = set.Collect(next, block.data(), block.size());
-    for (size_t i = 0; i < count; ++i) sum += block[i];
-    if (count < block.size()) return sum;
+    for (size_t i = 0; i < count; ++i) fn(block[i]);
+    if (count < block.size()) return;
     next = block[count - 1] + 1;
   }
+}
+
+uint64_t SumCollected(const BitSet& set) {
+  uint64_t sum = 0;
+  ForEachCollected(set, [&](Slot id) { sum += id; });
+  return sum;
 }
 
 uint64_t SumOf(const std::vector<Slot>& ids) {
@@ -30,6 +36,20 @@ uint64_t SumOf(const std::vector<Slot>& ids) {
   for (Slot id : ids) sum += id;
   return sum;
 }
+
+/// What a viewer would do with an id: look up where its vertices are.
+struct HeightSum {
+  const Mesh* mesh;
+  double value = 0;
+
+  void operator()(VertexId v) { value += mesh->Position(v)[2]; }
+  void operator()(EdgeId e) {
+    for (VertexId v : mesh->Vertices(e)) (*this)(v);
+  }
+  void operator()(FaceId f) {
+    for (VertexId v : mesh->Vertices(f)) (*this)(v);
+  }
+};
 
 template <typename Task>
 void Register(const std::string& name, size_t count, Task task) {
@@ -47,37 +67,63 @@ std::vector<Slot> BoundaryOf(const FlatMesh& flat, EntityKind kind) {
   std::vector<bool> on(flat.of({kind, EntityKind::kEdge}).size());
   for (uint32_t i = 0; i < uses.size(); ++i) {
     if (uses.Row(i).size() != 1) continue;
-    if (kind == side) on[i] = true;
-    if (kind != side)
+    if (kind == side) {
+      on[i] = true;
+    } else {
       for (uint32_t id : flat.of({side, kind}).Row(i)) on[id] = true;
+    }
   }
   std::vector<Slot> ids;
-  for (uint32_t i = 0; i < on.size(); ++i)
+  for (uint32_t i = 0; i < on.size(); ++i) {
     if (on[i]) ids.push_back(i);
+  }
   return ids;
 }
 
-void RegisterKind(const Fixture& fixture, EntityKind kind, const std::string& task) {
-  const BitSet& set = fixture.mesh.Boundary(kind);
-  const std::vector<Slot> ids = BoundaryOf(fixture.flat, kind);
-  std::vector<Slot> listed;
-  set.ListMembers(listed);
-  CheckSame(listed == ids, task.c_str(), "list");
+/// Listing alone: against reading an array. In blocks and at once.
+void RegisterListing(const BitSet& set, const std::vector<Slot>& ids, const std::string& task) {
+  const auto listed = std::make_shared<std::vector<Slot>>();
+  set.ListMembers(*listed);
+  CheckSame(*listed == ids, task.c_str(), "list");
   CheckSame(SumCollected(set) == SumOf(ids), task.c_str(), "collect");
   Register(task + "/limit", ids.size(), [ids] { return SumOf(ids); });
   Register(task + "/collect", ids.size(), [&set] { return SumCollected(set); });
-  Register(task + "/list", ids.size(), [&set, out = std::make_shared<std::vector<Slot>>()] {
-    set.ListMembers(*out);
-    return out->data();
+  Register(task + "/list", ids.size(), [&set, listed] {
+    set.ListMembers(*listed);
+    return listed->data();
   });
+}
+
+/// Listing to look something up: against the same with the ids at hand.
+template <typename Id>
+void RegisterUse(const Mesh& mesh, const std::vector<Slot>& ids, const std::string& task) {
+  const auto from_array = [&mesh, ids] {
+    HeightSum sum{&mesh};
+    for (Slot id : ids) sum(Id(id));
+    return sum.value;
+  };
+  const auto from_set = [&mesh] {
+    HeightSum sum{&mesh};
+    ForEachCollected(mesh.Boundary(Id::kKind), [&](Slot id) { sum(Id(id)); });
+    return sum.value;
+  };
+  CheckSame(from_array() == from_set(), task.c_str(), "use");
+  Register(task + "/limit", ids.size(), from_array);
+  Register(task + "/collect", ids.size(), from_set);
+}
+
+template <typename Id>
+void RegisterKind(const Fixture& fixture, const std::string& name) {
+  const std::vector<Slot> ids = BoundaryOf(fixture.flat, Id::kKind);
+  RegisterListing(fixture.mesh.Boundary(Id::kKind), ids, "boundary/" + name);
+  RegisterUse<Id>(fixture.mesh, ids, "boundary/" + name + "_used");
 }
 
 }  // namespace
 
 void RegisterBoundary(const Fixture& fixture) {
-  const EntityKind side = fixture.flat.has_cells() ? EntityKind::kFace : EntityKind::kEdge;
-  RegisterKind(fixture, side, fixture.flat.has_cells() ? "boundary/faces" : "boundary/edges");
-  RegisterKind(fixture, EntityKind::kVertex, "boundary/vertices");
+  fixture.flat.has_cells() ? RegisterKind<FaceId>(fixture, "faces") : RegisterKind<EdgeId>(fixture, "edges");
+  RegisterKind<VertexId>(fixture, "vertices");
 }
 
 }  // namespace dynmesh::bench

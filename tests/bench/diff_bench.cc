@@ -9,8 +9,6 @@
 #include <vector>
 
 #include "core/delta/diff.h"
-#include "core/delta/mirror.h"
-#include "tests/bench/digest.h"
 #include "tests/bench/edits.h"
 #include "tests/bench/tasks.h"
 
@@ -63,7 +61,7 @@ void Register(const std::string& name, size_t bytes, Task task) {
   benchmark::RegisterBenchmark(name.c_str(), run)->Unit(benchmark::kMicrosecond);
 }
 
-/// `edited` brings a copy at revision `from` to the present.
+/// What changed in `mesh` since `from`, and copying that.
 void RegisterCase(const std::string& task, std::shared_ptr<const Mesh> mesh, int64_t from) {
   const auto delta = std::make_shared<const Delta>(Diff(*mesh, from));
   const std::vector<Bytes> arrays = ArraysOf(*delta);

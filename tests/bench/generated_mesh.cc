@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <initializer_list>
 
 #include "tests/bench/mesh_source.h"
 
@@ -55,23 +56,27 @@ class Grid {
   const size_t nx_, ny_, nz_;
 };
 
+/// The six positively oriented tetrahedra of a cell round its diagonal from corner 0 to corner 6.
+template <typename Corners, typename Add>
+void AddPaths(const Corners& corners, Add add) {
+  constexpr int kRing[] = {1, 2, 3, 7, 4, 5};
+  for (int i = 0; i < 6; ++i) add(corners, {0, kRing[i], kRing[(i + 1) % 6], 6});
+}
+
 /// A cube of about `about` hexahedra, or tetrahedra of which six share a diagonal of each grid cell.
 MeshInput CubeGrid(ElementType type, size_t about) {
-  // Paths from corner 0 to corner 6 along edges of the cube; all tetrahedra are positively oriented.
-  constexpr int kTets[6][4] = {{0, 1, 2, 6}, {0, 2, 3, 6}, {0, 3, 7, 6},
-                               {0, 7, 4, 6}, {0, 4, 5, 6}, {0, 5, 1, 6}};
   const bool tets = type == ElementType::kTetrahedron;
   const size_t side = std::max<size_t>(1, std::lround(std::cbrt(about / (tets ? 6.0 : 1.0))));
   MeshInput input;
   input.type = type;
   Grid grid(input, side, side, side);
   grid.AddPoints();
+  const auto add = [&](const auto& corners, std::initializer_list<int> element) {
+    for (int corner : element) input.elements.push_back(corners[corner]);
+  };
   grid.ForEachCell([&](const auto& corners) {
-    if (!tets)
-      return static_cast<void>(input.elements.insert(input.elements.end(), corners.begin(), corners.end()));
-    for (const auto& tet : kTets) {
-      for (int corner : tet) input.elements.push_back(corners[corner]);
-    }
+    if (!tets) add(corners, {0, 1, 2, 3, 4, 5, 6, 7});
+    if (tets) AddPaths(corners, add);
   });
   return input;
 }

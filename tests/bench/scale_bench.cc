@@ -51,6 +51,7 @@ int main(int argc, char** argv) {
   }
   argv[1] = argv[0];
   const MeshInput input = HilbertSorted(GenerateMesh(ElementType::kTetrahedron, count));
+  DescribeInput(input, "hilbert");
   const Mesh mesh = BuildMesh(input);
   Mesh stored = mesh.Clone();
   Must(stored.StoreRelation({EntityKind::kCell, EntityKind::kEdge}, true));

@@ -6,8 +6,6 @@
 namespace dynmesh::bench {
 namespace {
 
-constexpr uint32_t kTaken = ~uint32_t{0};
-
 /// A cycle of kSize vertices as lowest vertex and the rest: rotated, then reflected so that equal cycles are
 /// equal.
 template <int kSize>
@@ -45,19 +43,11 @@ class Buckets {
   /// them.
   template <typename Leader, typename Equal>
   void ForEachGroup(Leader leader, Equal equal) {
-    size_t begin = 0;
+    uint32_t begin = 0;
     for (uint32_t v = 0; v + 1 < end_.size(); ++v) {
-      const size_t end = end_[v];
-      for (size_t i = begin; i < end; ++i) {
-        if (items_[i].item == kTaken) continue;
-        leader(items_[i].item, v, items_[i].others);
-        equal(items_[i].item);
-        for (size_t j = i + 1; j < end; ++j) {
-          if (items_[j].others != items_[i].others || items_[j].item == kTaken) continue;
-          equal(items_[j].item);
-          items_[j].item = kTaken;
-        }
-      }
+      const uint32_t end = end_[v];
+      uint32_t rest = end;  // [begin, rest) is what has no group yet
+      while (begin < rest) rest = TakeGroup(v, begin, rest, leader, equal);
       begin = end;
     }
   }
@@ -68,7 +58,31 @@ class Buckets {
     std::array<uint32_t, kSize - 1> others;
   };
 
-  std::vector<size_t> end_;
+  /// The group of the first item of [begin, end); the others close up, in order. Returns where they end.
+  template <typename Leader, typename Equal>
+  uint32_t TakeGroup(uint32_t lowest, uint32_t begin, uint32_t end, Leader& leader, Equal& equal) {
+    const Item first = items_[begin];
+    leader(first.item, lowest, first.others);
+    equal(first.item);
+    uint32_t kept = begin;
+    for (uint32_t i = begin + 1; i < end; ++i) {
+      if (SameOthers(first, items_[i])) {
+        equal(items_[i].item);
+      } else {
+        items_[kept++] = items_[i];
+      }
+    }
+    return kept;
+  }
+
+  /// Word by word: std::array's comparison calls memcmp.
+  static bool SameOthers(const Item& a, const Item& b) {
+    uint32_t difference = 0;
+    for (int k = 0; k < kSize - 1; ++k) difference |= a.others[k] ^ b.others[k];
+    return difference == 0;
+  }
+
+  std::vector<uint32_t> end_;
   std::vector<Item> items_;
 };
 
@@ -132,7 +146,7 @@ class Builder {
     ForEachUse(
         [&](uint32_t use, const FaceCycle& cycle) { buckets.Put(use, Canonical<kFaceSize>(cycle.data())); });
     ReserveFaces(num_uses);
-    uint32_t face = kTaken;
+    uint32_t face = 0;
     buckets.ForEachGroup([&](uint32_t use, auto&&...) { face = AddFace(use); },
                          [&](uint32_t use) { AddUse(face, use); });
     Rows(2, 3).offsets.push_back(num_uses);
