@@ -84,7 +84,8 @@ def _scale(table, runs):
     runs = sorted(runs, key=lambda run: run.elements)
     for name in runs[0].benchmarks if runs else ():
         costs = [run.ns(name) / run.elements for run in runs if run.ns(name)]
-        table.at_most(f"{name}: cost a tetrahedron, {runs[-1].elements} / {runs[0].elements}", costs[-1] / costs[0], 1.5)
+        table.at_most(f"{name}: cost a tetrahedron, {runs[-1].elements} / {runs[0].elements}",
+                      costs[-1] / costs[0], 1.5)
 
 
 def table(runs):
