@@ -11,6 +11,8 @@
 
 namespace dynmesh::bench {
 
+void UseNewPages() { mallopt(M_MMAP_THRESHOLD, 128 << 10); }
+
 MeshInput InputOfArguments(int& argc, char** argv) {
   const std::string source = argc > 2 ? argv[1] : "", order = argc > 2 ? argv[2] : "";
   if (order != "raw" && order != "hilbert") {
@@ -33,8 +35,6 @@ void DescribeInput(const MeshInput& input, const std::string& order) {
 }
 
 int RunBenchmarks(int argc, char** argv) {
-  // Large arrays always come from new pages: else what was freed before decides who gets warm ones.
-  mallopt(M_MMAP_THRESHOLD, 128 << 10);
   benchmark::Initialize(&argc, argv);
   if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 2;
   benchmark::RunSpecifiedBenchmarks();

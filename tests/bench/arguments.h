@@ -7,6 +7,10 @@
 
 namespace dynmesh::bench {
 
+/// Makes large arrays always come from new pages: else what happened to be freed before decides who gets warm ones.
+/// Call it first of all.
+void UseNewPages();
+
 /// The mesh that the first two arguments name, which are taken away: its source (see ReadMeshInput) and its
 /// order, "raw" (that of the source; a generated mesh is shuffled) or "hilbert". Ends the program when they
 /// are wrong.

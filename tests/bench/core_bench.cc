@@ -7,6 +7,7 @@
 
 int main(int argc, char** argv) {
   using namespace dynmesh::bench;  // NOLINT: this is the program
+  UseNewPages();
   const Fixture fixture(InputOfArguments(argc, argv));
   RegisterBuild(fixture);
   RegisterRelations(fixture);

@@ -57,6 +57,7 @@ void FlatBytesPerElement(benchmark::State& state, const MeshInput* input) {
 
 int main(int argc, char** argv) {
   using namespace dynmesh::bench;  // NOLINT: this is the program
+  UseNewPages();
   const MeshInput input = InputOfArguments(argc, argv);
   benchmark::RegisterBenchmark("memory/bytes_per_cell/default", BytesPerElement<false>, &input)
       ->Iterations(1);

@@ -44,6 +44,7 @@ void PaperTask(benchmark::State& state, const Mesh* mesh) {
 int main(int argc, char** argv) {
   using namespace dynmesh;         // NOLINT: this is the program
   using namespace dynmesh::bench;  // NOLINT
+  UseNewPages();
   uint32_t count = 0;
   if (argc < 2 || !absl::SimpleAtoi(argv[1], &count) || count == 0) {
     std::cerr << "usage: " << argv[0] << " NUM_TETRAHEDRA [--benchmark_...]\n";
