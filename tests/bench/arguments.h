@@ -7,8 +7,8 @@
 
 namespace dynmesh::bench {
 
-/// Makes large arrays always come from new pages: else what happened to be freed before decides who gets warm ones.
-/// Call it first of all.
+/// Makes large arrays always come from new pages: else what happened to be freed before decides who gets warm
+/// ones. Call it first of all.
 void UseNewPages();
 
 /// The mesh that the first two arguments name, which are taken away: its source (see ReadMeshInput) and its
