@@ -288,13 +288,21 @@ bool BulkBuilder::HasLowerTwin(CellId c) const {
   return twin.valid() && twin < c;
 }
 
+// The later of the two as they were put in is the duplicate, whatever slots they got.
 absl::Status BulkBuilder::RefuseDuplicate(EntityId id) const {
-  EntityId original(id.kind, kNoSlot);
-  if (id.kind == EntityKind::kCell) original = mesh_.FindTwin(CellId(id.slot));
-  if (id.kind == EntityKind::kFace) original = mesh_.FindFace(mesh_.VerticesOf(id));
-  if (id.kind == EntityKind::kEdge)
-    original = mesh_.FindEdge(mesh_.VerticesOf(id)[0], mesh_.VerticesOf(id)[1]);
-  return WithMetadata(mesh_.RefuseDuplicate(original), "position", absl::StrCat(id.slot));
+  EntityId twin(id.kind, kNoSlot);
+  if (id.kind == EntityKind::kCell) twin = mesh_.FindTwin(CellId(id.slot));
+  if (id.kind == EntityKind::kFace) twin = mesh_.FindFace(mesh_.VerticesOf(id));
+  if (id.kind == EntityKind::kEdge) twin = mesh_.FindEdge(mesh_.VerticesOf(id)[0], mesh_.VerticesOf(id)[1]);
+  const Slot place = PlaceOf(id), place_of_twin = PlaceOf(twin);
+  return WithMetadata(mesh_.RefuseDuplicate({id.kind, std::min(place, place_of_twin)}), "position",
+                      absl::StrCat(std::max(place, place_of_twin)));
+}
+
+Slot BulkBuilder::PlaceOf(EntityId element) const {
+  const Permutation& slots = result_.slots[Dimension(element.kind)];
+  if (slots.empty()) return element.slot;
+  return std::find(slots.begin(), slots.end(), element.slot) - slots.begin();
 }
 
 }  // namespace dynmesh

@@ -97,6 +97,8 @@ class BulkBuilder {
   absl::Status ReportElements();
   bool HasLowerTwin(CellId c) const;
   absl::Status RefuseDuplicate(EntityId id) const;
+  /// Which of the elements of its kind that were put in it is.
+  Slot PlaceOf(EntityId element) const;
 
   // bulk_topology.cc: which faces and edges there are
   absl::Status MatchFaces();

@@ -1,5 +1,6 @@
 #include "server/rpc/convert_sessions.h"
 
+#include <algorithm>
 #include <utility>
 #include <variant>
 
@@ -14,12 +15,21 @@ namespace {
 
 // Says which version of a token it is, and keeps a bare name from being one.
 constexpr char kTokenPrefix = '1';
+// So much of a path that a peer made up is repeated to it.
+constexpr size_t kMaxShownPath = 64;
 
 google::protobuf::Timestamp FromTime(absl::Time time) {
   google::protobuf::Timestamp message;
   const int64_t nanos = absl::ToUnixNanos(time);
   message.set_seconds(nanos / 1'000'000'000);
   message.set_nanos(nanos % 1'000'000'000);
+  return message;
+}
+
+v1::Relation FromRelation(Relation relation) {
+  v1::Relation message;
+  message.set_from(FromEntityKind(relation.from));
+  message.set_to(FromEntityKind(relation.to));
   return message;
 }
 
@@ -59,17 +69,42 @@ struct ExportVisitor {
 
 absl::StatusOr<SessionSettings> ToSettings(const v1::SessionSettings& message) {
   SessionSettings settings;
-  switch (message.duplicate_policy()) {
-    case v1::DUPLICATE_POLICY_UNSPECIFIED:
-    case v1::DUPLICATE_POLICY_KEEP:
-      settings.duplicates = DuplicatePolicy::kKeep;
-      return settings;
-    case v1::DUPLICATE_POLICY_REFUSE:
-      settings.duplicates = DuplicatePolicy::kRefuse;
-      return settings;
-    default:
-      return BadField("duplicate_policy", "there is no such duplicate_policy");
+  if (message.duplicate_policy() == v1::DUPLICATE_POLICY_REFUSE) {
+    settings.duplicates = DuplicatePolicy::kRefuse;
+  } else if (message.duplicate_policy() != v1::DUPLICATE_POLICY_UNSPECIFIED &&
+             message.duplicate_policy() != v1::DUPLICATE_POLICY_KEEP) {
+    return BadField("duplicate_policy", "there is no such duplicate_policy");
   }
+  DYNMESH_ASSIGN_OR_RETURN(settings.stored_relations, ToStoredRelations(message));
+  return settings;
+}
+
+absl::StatusOr<std::vector<Relation>> ToStoredRelations(const v1::SessionSettings& message) {
+  std::vector<Relation> relations;
+  for (const v1::Relation& named : message.stored_relations()) {
+    Relation relation;
+    DYNMESH_ASSIGN_OR_RETURN(relation.from, ToEntityKind(named.from(), "stored_relations"));
+    DYNMESH_ASSIGN_OR_RETURN(relation.to, ToEntityKind(named.to(), "stored_relations"));
+    const std::string name = absl::StrCat(EntityKindName(relation.from), "->", EntityKindName(relation.to));
+    if (StorableIndex(relation) == kNumStorableRelations) {
+      return BadField("stored_relations", absl::StrCat(name, " is not one that can be switched"));
+    }
+    if (std::find(relations.begin(), relations.end(), relation) != relations.end()) {
+      return BadField("stored_relations", absl::StrCat(name, " is named twice"));
+    }
+    relations.push_back(relation);
+  }
+  return relations;
+}
+
+absl::Status CheckUpdateMask(const google::protobuf::FieldMask& mask) {
+  if (mask.paths().empty()) return BadField("update_mask", "update_mask names no field");
+  for (const std::string& path : mask.paths()) {
+    if (path == "settings.stored_relations") continue;
+    return BadField("update_mask", absl::StrCat("\"", absl::CHexEscape(path.substr(0, kMaxShownPath)),
+                                                "\" is not a field that can be changed"));
+  }
+  return absl::OkStatus();
 }
 
 v1::Session FromSessionInfo(const SessionInfo& info) {
@@ -81,6 +116,12 @@ v1::Session FromSessionInfo(const SessionInfo& info) {
   message.mutable_settings()->set_duplicate_policy(info.settings.duplicates == DuplicatePolicy::kRefuse
                                                        ? v1::DUPLICATE_POLICY_REFUSE
                                                        : v1::DUPLICATE_POLICY_KEEP);
+  for (const StoredRelation& stored : info.stored_relations) {
+    *message.mutable_settings()->add_stored_relations() = FromRelation(stored.relation);
+    v1::StoredRelation* part = message.add_stored_relations();
+    *part->mutable_relation() = FromRelation(stored.relation);
+    part->set_memory_bytes(stored.memory_bytes);
+  }
   *message.mutable_create_time() = FromTime(info.create_time);
   *message.mutable_update_time() = FromTime(info.update_time);
   *message.mutable_counts() = FromCounts(info.counts);
@@ -114,8 +155,14 @@ absl::StatusOr<std::string> FromPageToken(const std::string& token) {
                          {{"field", "page_token"}});
 }
 
-ImportOptions ToImportOptions(const v1::ImportHeader& header) {
+absl::StatusOr<ImportOptions> ToImportOptions(const v1::ImportHeader& header) {
   ImportOptions options;
+  if (header.slot_order() == v1::SLOT_ORDER_HILBERT) {
+    options.slot_order = SlotOrder::kHilbert;
+  } else if (header.slot_order() != v1::SLOT_ORDER_UNSPECIFIED &&
+             header.slot_order() != v1::SLOT_ORDER_CALLER) {
+    return BadField("slot_order", "there is no such slot_order");
+  }
   options.num_vertices = header.num_vertices();
   options.num_elements = header.num_elements();
   options.validate_only = header.validate_only();

@@ -2,6 +2,7 @@
 #define DYNMESH_SERVER_RPC_CONVERT_SESSIONS_H_
 
 #include <string>
+#include <vector>
 
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
@@ -14,6 +15,10 @@ namespace dynmesh {
 
 /// Errors: INVALID_ARGUMENT BAD_ARGUMENT.
 absl::StatusOr<SessionSettings> ToSettings(const v1::SessionSettings& message);
+/// Each storable, and named once. Errors: INVALID_ARGUMENT BAD_ARGUMENT.
+absl::StatusOr<std::vector<Relation>> ToStoredRelations(const v1::SessionSettings& message);
+/// INVALID_ARGUMENT BAD_ARGUMENT unless the mask names fields that UpdateSession can change.
+absl::Status CheckUpdateMask(const google::protobuf::FieldMask& mask);
 v1::Session FromSessionInfo(const SessionInfo& info);
 
 /// Opaque: the name of the last session of a page.
@@ -21,7 +26,8 @@ std::string ToPageToken(absl::string_view last_name);
 /// Errors: INVALID_ARGUMENT BAD_PAGE_TOKEN. Empty for an empty token.
 absl::StatusOr<std::string> FromPageToken(const std::string& token);
 
-ImportOptions ToImportOptions(const v1::ImportHeader& header);
+/// Errors: INVALID_ARGUMENT BAD_ARGUMENT.
+absl::StatusOr<ImportOptions> ToImportOptions(const v1::ImportHeader& header);
 
 /// Hands what an import message carries to `staged`; takes the bytes out of it.
 /// Errors: those of StagedMesh; INVALID_ARGUMENT BAD_ARGUMENT for a second header or an empty message.

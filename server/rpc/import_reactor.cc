@@ -5,10 +5,12 @@
 
 #include "absl/time/clock.h"
 #include "core/mesh/error.h"
+#include "server/rpc/convert.h"
 #include "server/rpc/convert_sessions.h"
 #include "server/rpc/status.h"
 #include "server/rpc/unary.h"
 #include "server/session/catch_exceptions.h"
+#include "server/session/selection.h"
 #include "server/session/session_errors.h"
 
 namespace dynmesh {
@@ -119,8 +121,9 @@ absl::Status ImportReactor::Stage() {
 
 absl::Status ImportReactor::BeginImport(const v1::ImportHeader& header) {
   DYNMESH_ASSIGN_OR_RETURN(SessionPtr session, services_.registry.Find(header.session()));
-  DYNMESH_ASSIGN_OR_RETURN(importer_, Importer::Start(std::move(session), services_.registry.import_gate(),
-                                                      ToImportOptions(header)));
+  DYNMESH_ASSIGN_OR_RETURN(const ImportOptions options, ToImportOptions(header));
+  DYNMESH_ASSIGN_OR_RETURN(importer_,
+                           Importer::Start(std::move(session), services_.registry.import_gate(), options));
   return absl::OkStatus();
 }
 
@@ -146,6 +149,7 @@ void ImportReactor::OnWriteDone(bool ok) {
   }
   if (!ok) cancelled_ = true;
   if (phase == Phase::kFinishing) return EndWith(end);
+  if (phase == Phase::kAnswering) return ok ? WriteIds() : EndAnswer(CallCancelled());
   if (phase != Phase::kAnnouncing) return;
   if (!ok) return EndWith(CallCancelled());
   if (progress_.progress().phase() != kBuilding) return Announce();
@@ -154,12 +158,48 @@ void ImportReactor::OnWriteDone(bool ok) {
 
 void ImportReactor::Build() {
   const absl::Status built = CatchExceptions([this]() -> absl::Status {
-    DYNMESH_ASSIGN_OR_RETURN(const std::shared_ptr<const ImportOutcome> outcome, importer_->Finish(*this));
-    FromImportOutcome(*outcome, result_.mutable_result());
+    DYNMESH_ASSIGN_OR_RETURN(answer_, importer_->Finish(*this));
+    FromImportOutcome(*answer_.outcome, result_.mutable_result());
     return absl::OkStatus();
   });
+  if (!built.ok()) return EndAnswer(built);
+  WatchUntil(absl::Now() + services_.limits().import_idle_timeout);
+  {
+    MutexLock lock(&mu_);
+    phase_ = Phase::kAnswering;
+    waiting_since_ = absl::Now();
+    if (writing_) return;  // OnWriteDone comes back here
+  }
+  WriteIds();
+}
+
+void ImportReactor::EndAnswer(const absl::Status& status) {
   importer_ = nullptr;  // leaves the gate before the peer knows that it may come again
-  EndWith(built);
+  EndWith(status);
+}
+
+bool ImportReactor::TakeIds() {
+  while (ids_kind_ < kNumEntityKinds && ids_next_ == answer_.slots[ids_kind_].size()) {
+    answer_.slots[ids_kind_++] = {};
+    ids_next_ = 0;
+  }
+  if (ids_kind_ == kNumEntityKinds) return false;
+  const Permutation& slots = answer_.slots[ids_kind_];
+  const size_t count = std::min(kChunkBytes / sizeof(Slot), slots.size() - ids_next_);
+  ids_.mutable_ids()->set_kind(FromEntityKind(kEntityKinds[ids_kind_]));
+  ids_.mutable_ids()->set_ids(slots.data() + ids_next_, count * sizeof(Slot));
+  ids_next_ += count;
+  return true;
+}
+
+void ImportReactor::WriteIds() {
+  if (!TakeIds()) return EndAnswer(absl::OkStatus());
+  {
+    MutexLock lock(&mu_);
+    writing_ = true;
+    waiting_since_ = absl::Now();
+  }
+  StartWrite(&ids_);
 }
 
 void ImportReactor::OnProgress(uint64_t done, uint64_t total) { WriteProgress(kBuilding, done, total); }

@@ -20,7 +20,7 @@ namespace dynmesh {
 /// One ImportMesh call.
 ///
 ///     read ──> stage (quick executor) ──> read ... ──> half-closed ──> announce "building"
-///          ──> build (heavy executor) ──> result
+///          ──> build (heavy executor) ──> ids, if they are not the caller's ──> result
 ///
 /// The announcement has to be written before the build begins: a read that ends looks the same whether the
 /// peer is done or gone, but to one who is gone nothing can be written. So a cut stream is never taken for a
@@ -50,7 +50,7 @@ class ImportReactor final : public grpc::ServerBidiReactor<v1::ImportMeshRequest
     ImportReactor* reactor ABSL_GUARDED_BY(mu);
   };
 
-  enum class Phase { kReceiving, kAnnouncing, kBuilding, kFinishing };
+  enum class Phase { kReceiving, kAnnouncing, kBuilding, kAnswering, kFinishing };
 
   absl::Status Stage();
   absl::Status BeginImport(const v1::ImportHeader& header);
@@ -61,6 +61,11 @@ class ImportReactor final : public grpc::ServerBidiReactor<v1::ImportMeshRequest
   void EndIdle();
   void Announce();
   void Build();
+  /// Puts the next ids into ids_; false when all are told.
+  bool TakeIds();
+  /// Writes the next ids; after the last, the result.
+  void WriteIds() ABSL_LOCKS_EXCLUDED(mu_);
+  void EndAnswer(const absl::Status& status);
   void WriteProgress(const char* phase, uint64_t done, uint64_t total) ABSL_LOCKS_EXCLUDED(mu_);
   /// Ends the call, after the write that is in flight. Called once.
   void EndWith(const absl::Status& status) ABSL_LOCKS_EXCLUDED(mu_);
@@ -73,7 +78,11 @@ class ImportReactor final : public grpc::ServerBidiReactor<v1::ImportMeshRequest
   std::unique_ptr<Importer> importer_;
   uint64_t next_report_ = 0;  ///< items received at which progress is due
   v1::ImportMeshRequest request_;
+  ImportAnswer answer_;
+  int ids_kind_ = 0;  ///< of the ids to be told next
+  size_t ids_next_ = 0;
   v1::ImportMeshResponse progress_;
+  v1::ImportMeshResponse ids_;
   v1::ImportMeshResponse result_;
 
   Mutex mu_;

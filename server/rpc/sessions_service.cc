@@ -41,6 +41,18 @@ absl::Status GetSession(const Session& session, v1::GetSessionResponse* response
   return absl::OkStatus();
 }
 
+absl::Status UpdateSession(Session& session, const v1::UpdateSessionRequest& request,
+                           v1::UpdateSessionResponse* response) {
+  DYNMESH_RETURN_IF_ERROR(CheckUpdateMask(request.update_mask()));
+  DYNMESH_ASSIGN_OR_RETURN(const std::vector<Relation> wanted,
+                           ToStoredRelations(request.session().settings()));
+  DYNMESH_RETURN_IF_ERROR(session.StoreRelations(wanted, request.session().etag()));
+  DYNMESH_ASSIGN_OR_RETURN(const SessionInfo info, session.Info());
+  *response->mutable_session() = FromSessionInfo(info);
+  response->set_revision(info.revision);
+  return absl::OkStatus();
+}
+
 /// What is to be told of the sessions is scanned once for each revision: for many entities that takes a
 /// while.
 bool IsLarge(const Session& session) {
@@ -188,6 +200,16 @@ class SessionsService final : public v1::SessionService::CallbackService {
                                          const v1::ListSessionsRequest* request,
                                          v1::ListSessionsResponse* response) override {
     return (new ListSessionsCall({"ListSessions", context, services_}, response))->Start(*request);
+  }
+
+  grpc::ServerUnaryReactor* UpdateSession(grpc::CallbackServerContext* context,
+                                          const v1::UpdateSessionRequest* request,
+                                          v1::UpdateSessionResponse* response) override {
+    return RunOnSession({"UpdateSession", context, services_}, request->session().name(),
+                        {AccessMode::kWrite, /*heavy=*/true},
+                        [request, response](const SessionPtr& session, AccessGrant) {
+                          return dynmesh::UpdateSession(*session, *request, response);
+                        });
   }
 
   grpc::ServerUnaryReactor* DeleteSession(grpc::CallbackServerContext* context,

@@ -14,6 +14,7 @@ uint64_t FingerprintOf(const std::string& name, const SessionSettings& settings)
   Fingerprint fingerprint;
   fingerprint.AddString(name);
   fingerprint.AddNumber(static_cast<uint64_t>(settings.duplicates));
+  for (Relation relation : settings.stored_relations) fingerprint.AddNumber(StorableIndex(relation));
   return fingerprint.value();
 }
 

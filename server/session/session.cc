@@ -110,7 +110,11 @@ Session::Session(const Options& options)
       mesh_(MeshOptions{options.settings.duplicates, ToMeshLimits(options.limits)}),
       commit_time_(create_time_),
       followers_(options.limits.max_followers),
-      deltas_(*this) {}
+      deltas_(*this) {
+  // Nothing to fill: this cannot fail for relations that are storable.
+  for (Relation relation : options.settings.stored_relations)
+    mesh_.StoreRelation(relation, true).IgnoreError();
+}
 
 absl::Status Session::Read(absl::FunctionRef<absl::Status(const SessionView&)> fn) const {
   ReaderMutexLock lock(&mu_);
@@ -128,7 +132,7 @@ SessionInfo Session::Describe(const Mesh& mesh, const MeshSummary& summary, absl
   SessionInfo info = DescribeMesh(mesh, summary);
   info.name = name();
   info.uid = uid();
-  info.settings = settings();
+  info.settings.duplicates = duplicates();
   info.etag = EtagAt(info.revision);
   info.create_time = create_time_;
   info.update_time = update_time;
@@ -220,6 +224,13 @@ void Session::Committed() {
   for (EntityKind kind : kEntityKinds) num_live_[Dimension(kind)].store(mesh_.NumLive(kind));
 }
 
+absl::Status Session::StoreRelations(absl::Span<const Relation> wanted, absl::string_view etag) {
+  WriterMutexLock lock(&mu_);
+  DYNMESH_RETURN_IF_ERROR(gone_);
+  DYNMESH_RETURN_IF_ERROR(CheckEtag(etag));
+  return StoreJust(mesh_, wanted, limits().max_session_bytes);
+}
+
 absl::Status Session::CheckEmpty() const {
   return revision() == 0 ? absl::OkStatus() : SessionNotEmpty(name(), revision());
 }
@@ -230,6 +241,7 @@ absl::Status Session::Adopt(Mesh& mesh) {
     WriterMutexLock lock(&mu_);
     DYNMESH_RETURN_IF_ERROR(gone_);
     DYNMESH_RETURN_IF_ERROR(CheckEmpty());
+    DYNMESH_RETURN_IF_ERROR(StoreJust(mesh, StoredRelationsOf(mesh_), limits().max_session_bytes));
     std::swap(mesh_, mesh);
     Committed();
   }
@@ -253,12 +265,16 @@ absl::StatusOr<int64_t> Session::Delete(absl::string_view etag) {
   {
     WriterMutexLock lock(&mu_);
     if (absl::IsNotFound(gone_)) return gone_;
-    const std::string present = EtagAt(mesh_.revision());
-    if (!etag.empty() && etag != present) return EtagMismatch(name(), present);
+    DYNMESH_RETURN_IF_ERROR(CheckEtag(etag));
     gone_ = SessionDeleted(name());
   }
   followers_.Close(SessionDeleted(name()));
   return revision();
+}
+
+absl::Status Session::CheckEtag(absl::string_view etag) const {
+  const std::string present = EtagAt(mesh_.revision());
+  return etag.empty() || etag == present ? absl::OkStatus() : EtagMismatch(name(), present);
 }
 
 std::string Session::EtagAt(int64_t revision) const { return absl::StrCat(uid_, "-", revision); }

@@ -65,7 +65,7 @@ class Session : public std::enable_shared_from_this<Session> {
  public:
   struct Options {
     std::string name;
-    SessionSettings settings;
+    SessionSettings settings;  ///< at first
     Limits limits;
     Workers workers;
   };
@@ -75,7 +75,7 @@ class Session : public std::enable_shared_from_this<Session> {
   Session& operator=(const Session&) = delete;
 
   const std::string& name() const { return options_.name; }
-  const SessionSettings& settings() const { return options_.settings; }
+  DuplicatePolicy duplicates() const { return options_.settings.duplicates; }
   const Limits& limits() const { return options_.limits; }
   const Workers& workers() const { return options_.workers; }
   /// Tells this session from an earlier or later one of the same name: 16 hexadecimal digits.
@@ -121,10 +121,16 @@ class Session : public std::enable_shared_from_this<Session> {
                                                                   uint64_t fingerprint) const
       ABSL_LOCKS_EXCLUDED(imports_mu_);
 
+  /// Stores just the relations of `wanted`; no revision is made. All or nothing. Takes the writer lock for as
+  /// long as that takes. Errors: those of StoreJust; ABORTED ETAG_MISMATCH (an empty `etag` fits any).
+  absl::Status StoreRelations(absl::Span<const Relation> wanted, absl::string_view etag)
+      ABSL_LOCKS_EXCLUDED(mu_);
+
   /// FAILED_PRECONDITION SESSION_NOT_EMPTY unless the session is at revision 0. Never waits.
   absl::Status CheckEmpty() const;
 
-  /// Makes `mesh`, which is at revision 1, the content. Errors: as CheckEmpty; `mesh` is untouched then.
+  /// Makes `mesh`, which is at revision 1, the content. It should store the relations that this does: else
+  /// they are switched under the lock. Errors: as CheckEmpty; RESOURCE_EXHAUSTED. Nothing changed then.
   absl::Status Adopt(Mesh& mesh) ABSL_LOCKS_EXCLUDED(mu_);
 
   void RememberImport(const std::string& request_id, uint64_t fingerprint,
@@ -141,6 +147,7 @@ class Session : public std::enable_shared_from_this<Session> {
   using AnswerPtr = std::shared_ptr<const BatchResult>;
 
   std::string EtagAt(int64_t revision) const;
+  absl::Status CheckEtag(absl::string_view etag) const ABSL_SHARED_LOCKS_REQUIRED(mu_);
   absl::Status CheckRevisions(const ApplyOptions& options) const ABSL_SHARED_LOCKS_REQUIRED(mu_);
   absl::StatusOr<AnswerPtr> ApplyLocked(absl::Span<const Edit> edits, const ApplyOptions& options)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "core/mesh/error.h"
+
 namespace dynmesh {
 namespace {
 
@@ -15,6 +17,24 @@ ElementTypeCounts CountElementTypes(const Mesh& mesh) {
     });
   }
   return counts;
+}
+
+bool Contains(absl::Span<const Relation> relations, Relation relation) {
+  return std::find(relations.begin(), relations.end(), relation) != relations.end();
+}
+
+/// Switches on what is wanted and not stored, and tells what that was.
+absl::Status SwitchOn(Mesh& mesh, absl::Span<const Relation> wanted, uint64_t max_bytes,
+                      std::vector<Relation>& switched) {
+  for (Relation relation : wanted) {
+    if (mesh.stored().Has(relation)) continue;
+    DYNMESH_RETURN_IF_ERROR(mesh.StoreRelation(relation, true));
+    switched.push_back(relation);
+    if (mesh.memory_bytes() > max_bytes) {
+      return LimitExceeded("max_session_bytes", max_bytes, mesh.memory_bytes());
+    }
+  }
+  return absl::OkStatus();
 }
 
 MeshSummary Summarize(const Mesh& mesh) {
@@ -50,6 +70,24 @@ MeshSummary SummaryCache::Of(const Mesh& mesh) {
   return summary_;
 }
 
+std::vector<Relation> StoredRelationsOf(const Mesh& mesh) {
+  std::vector<Relation> stored;
+  for (Relation relation : kStorableRelations) {
+    if (mesh.stored().Has(relation)) stored.push_back(relation);
+  }
+  return stored;
+}
+
+absl::Status StoreJust(Mesh& mesh, absl::Span<const Relation> wanted, uint64_t max_bytes) {
+  std::vector<Relation> switched;
+  const absl::Status status = SwitchOn(mesh, wanted, max_bytes, switched);
+  for (Relation relation : status.ok() ? StoredRelationsOf(mesh) : switched) {
+    // Switching off cannot fail.
+    if (!status.ok() || !Contains(wanted, relation)) mesh.StoreRelation(relation, false).IgnoreError();
+  }
+  return status;
+}
+
 SessionInfo DescribeMesh(const Mesh& mesh, const MeshSummary& summary) {
   SessionInfo info;
   info.revision = mesh.revision();
@@ -64,6 +102,10 @@ SessionInfo DescribeMesh(const Mesh& mesh, const MeshSummary& summary) {
   info.checksum = mesh.checksum();
   info.memory_bytes = mesh.memory_bytes();
   for (const AttributeColumn& column : mesh.attributes()) info.attributes.push_back(column.spec());
+  info.settings.stored_relations = StoredRelationsOf(mesh);
+  for (Relation relation : info.settings.stored_relations) {
+    info.stored_relations.push_back({relation, mesh.stored().memory_bytes(relation)});
+  }
   return info;
 }
 

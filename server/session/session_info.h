@@ -7,8 +7,10 @@
 #include <vector>
 
 #include "absl/base/thread_annotations.h"
+#include "absl/status/status.h"
 #include "absl/time/time.h"
 #include "absl/types/optional.h"
+#include "absl/types/span.h"
 #include "core/mesh/estimate.h"
 #include "core/mesh/mesh.h"
 #include "server/session/mutex.h"
@@ -27,10 +29,24 @@ struct Box {
 /// The box round the live vertices; nullopt without any. Cost: vertices.
 absl::optional<Box> BoundsOf(const Mesh& mesh);
 
-/// Settings of a session, fixed when it is created.
 struct SessionSettings {
-  DuplicatePolicy duplicates = DuplicatePolicy::kKeep;
+  DuplicatePolicy duplicates = DuplicatePolicy::kKeep;  ///< fixed when the session is created
+  std::vector<Relation> stored_relations = {};          ///< each of kStorableRelations, once
 };
+
+/// A relation that a session keeps stored, and the bytes of its table.
+struct StoredRelation {
+  Relation relation;
+  uint64_t memory_bytes = 0;
+};
+
+/// Those of `mesh`, in the order of kStorableRelations.
+std::vector<Relation> StoredRelationsOf(const Mesh& mesh);
+
+/// Makes `mesh` store just those of `wanted`; on failure it stores what it did before.
+/// Errors: INVALID_ARGUMENT unless all are storable; RESOURCE_EXHAUSTED, also LIMIT_EXCEEDED
+/// (max_session_bytes) when the mesh would take more than `max_bytes`. Cost: all rows of each new relation.
+absl::Status StoreJust(Mesh& mesh, absl::Span<const Relation> wanted, uint64_t max_bytes);
 
 /// What a session is and holds at one revision.
 struct SessionInfo {
@@ -50,6 +66,7 @@ struct SessionInfo {
   uint64_t memory_bytes = 0;
   uint32_t followers = 0;
   std::vector<AttributeSpec> attributes;
+  std::vector<StoredRelation> stored_relations;  ///< those of settings, in that order
   absl::optional<Box> bounds;
 };
 
@@ -73,7 +90,7 @@ class SummaryCache {
   MeshSummary summary_ ABSL_GUARDED_BY(mu_);
 };
 
-/// The parts that `mesh` knows: counts, checksum, attributes, memory and `summary`.
+/// The parts that `mesh` knows: counts, checksum, attributes, stored relations, memory and `summary`.
 SessionInfo DescribeMesh(const Mesh& mesh, const MeshSummary& summary);
 
 }  // namespace dynmesh

@@ -68,6 +68,28 @@ def test_output_for_humans(run, mesh_file):
     assert run("rm", "human").stdout == "deleted human at revision 1\n"
 
 
+def test_a_hilbert_import_writes_the_map_of_ids(run, mesh_file, tmp_path):
+    made = run("create", "curve", mesh_file, "--slot-order", "hilbert", "--slot-map", tmp_path / "map", "--json")
+    assert made.returncode == 0, made.stderr
+    slots = np.load(tmp_path / "map")
+    assert sorted(slots.files) == ["cell", "vertex"]
+    assert sorted(slots["vertex"]) == [0, 1, 2, 3, 4] and sorted(slots["cell"]) == [0, 1]
+    run("rm", "curve")
+
+
+def test_relations_are_stored_by_name(run, mesh_file):
+    assert run("create", "store", mesh_file).returncode == 0
+    stored = run("store", "store", "vertex-cell", "cell-cell", "--json")
+    assert stored.returncode == 0, stored.stderr
+    assert list(json.loads(stored.stdout)["stored_relations"]) == ["vertex-cell", "cell-cell"]
+    assert "stored     vertex-cell" in run("info", "store").stdout
+    assert json.loads(run("store", "store", "none", "--json").stdout)["stored_relations"] == {}
+    refused = run("store", "store", "edge-edge")
+    assert refused.returncode == 1 and "edge->edge is not one that can be switched" in refused.stderr
+    assert run("store", "store", "vertexcell").returncode == 2
+    run("rm", "store")
+
+
 def test_import_fills_an_empty_session_once(run, mesh_file):
     assert run("create", "later").returncode == 0
     assert run("import", "later", mesh_file).returncode == 0
@@ -120,7 +142,7 @@ def test_wrong_usage_is_2(run, args):
 
 
 def test_help_is_there_for_every_command(run):
-    for command in ("serve", "create", "import", "export", "ls", "info", "watch", "rm"):
+    for command in ("serve", "create", "import", "store", "export", "ls", "info", "watch", "rm"):
         shown = run(command, "--help")
         assert shown.returncode == 0 and "usage: dynmesh" in shown.stdout
 

@@ -115,3 +115,71 @@ def test_points_of_the_plane_get_a_z_of_zero(session):
     mesh.points, mesh.cells = mesh.points[:3, :2].astype(np.float32), []
     session.import_mesh(mesh)
     assert session.positions().tolist() == [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+
+
+STORABLE = [
+    ("cell", "edge"),
+    ("vertex", "cell"),
+    ("edge", "cell"),
+    ("vertex", "face"),
+    ("cell", "cell"),
+    ("vertex", "vertex"),
+]
+
+
+def test_relations_can_be_stored_at_any_moment_and_answers_stay_the_same(session):
+    session.import_mesh(grid_tets(3))
+    before = {pair: session.neighbors(*pair).to_dict() for pair in STORABLE}
+    info = session.store_relations(STORABLE)
+    assert [(str(a), str(b)) for a, b in info.stored_relations] == STORABLE
+    assert all(size > 0 for size in info.stored_relations.values()) and info.revision == 1
+    assert {pair: session.neighbors(*pair).to_dict() for pair in STORABLE} == before
+    with session.edit() as tx:
+        tx.remove_elements("cell", range(0, 100, 3))
+    edited = {pair: session.neighbors(*pair).to_dict() for pair in STORABLE}
+    assert session.store_relations([]).stored_relations == {}
+    assert {pair: session.neighbors(*pair).to_dict() for pair in STORABLE} == edited != before
+    assert session.validate() == []
+
+
+def test_relations_that_cannot_be_stored_are_refused(session):
+    with pytest.raises(dynmesh.InvalidArgumentError, match="edge->edge"):
+        session.store_relations([("edge", "edge")])
+    with pytest.raises(dynmesh.InvalidArgumentError, match="twice"):
+        session.store_relations([("cell", "cell"), (dynmesh.EntityKind.CELL, "cell")])
+    with pytest.raises(dynmesh.InvalidArgumentError, match="pair of kinds"):
+        session.store_relations("vertex-cell")
+    with pytest.raises(dynmesh.AbortedError, match="ETAG_MISMATCH"):
+        session.store_relations([], etag="another")
+    assert session.info().stored_relations == {}
+
+
+def test_a_session_stores_from_the_beginning_what_it_was_created_with(client):
+    session = client.create_session("storing", stored_relations=[("vertex", "cell")])
+    session.import_mesh(TET, {"tetra": [[0, 1, 2, 3]]})
+    (pair,) = session.info().stored_relations
+    assert pair == (dynmesh.EntityKind.VERTEX, dynmesh.EntityKind.CELL)
+    session.delete()
+
+
+def test_a_hilbert_import_tells_the_ids(session):
+    mesh = grid_tets(6)
+    points, tets = mesh.points, np.asarray(mesh.cells[0].data)
+    shuffled = np.random.default_rng(5).permutation(len(tets))
+    result = session.import_mesh(points, {"tetra": tets[shuffled]}, slot_order="hilbert")
+    vertex, cell = (result.slots[kind] for kind in (dynmesh.EntityKind.VERTEX, dynmesh.EntityKind.CELL))
+    assert sorted(vertex) == list(range(len(points))) and sorted(cell) == list(range(len(tets)))
+    assert (session.positions()[vertex] == points).all()
+    stored = session.neighbors("cell", "vertex").neighbors.reshape(-1, 4)
+    assert (stored[cell] == vertex[tets[shuffled]]).all()
+    # Along the curve vertices are neighbours in space; in the order of the grid every row begins with a jump.
+    assert _mean_step(session.positions()) < 0.9 * _mean_step(points)
+
+
+def _mean_step(points):
+    return np.linalg.norm(np.diff(points, axis=0), axis=1).mean()
+
+
+def test_an_unknown_slot_order_is_refused(session):
+    with pytest.raises(dynmesh.InvalidArgumentError, match="slot_order"):
+        session.import_mesh(TET, {}, slot_order="random")

@@ -96,6 +96,59 @@ TEST_F(ImportRpcTest, AttributesTravelBothWays) {
   EXPECT_THAT(Array<int32_t>(chunks[2].attribute().values()), ElementsAre(1, 2, 3, 4));
 }
 
+TEST_F(ImportRpcTest, HilbertOrderIsToldBeforeTheResultInPieces) {
+  const Mesh mesh = TetGrid(40, 40, 40);  // more cells than one message has room for ids
+  v1::ImportMeshRequest head = ImportHead("mesh");
+  head.mutable_header()->set_slot_order(v1::SLOT_ORDER_HILBERT);
+  std::vector<v1::ImportMeshRequest> requests = {head};
+  std::vector<Point> points;
+  mesh.slots(EntityKind::kVertex).live().ForEach([&](Slot v) {
+    points.push_back(mesh.Position(VertexId(v)));
+  });
+  requests.push_back(ImportPositions(points));
+  const Slot num_cells = mesh.NumLive(EntityKind::kCell);
+  for (Slot c = 0; c < num_cells;) {
+    std::vector<Slot> ids;
+    for (; c < num_cells && ids.size() < 100'000; ++c) {
+      for (VertexId v : mesh.Vertices(CellId(c))) ids.push_back(v.slot());
+    }
+    requests.push_back(ImportElements(v1::ELEMENT_TYPE_TETRAHEDRON, ids));
+  }
+  PatientContext context;
+  const auto stream = sessions().ImportMesh(&context);
+  for (const auto& request : requests) ASSERT_TRUE(stream->Write(request));
+  stream->WritesDone();
+  std::map<v1::EntityKind, std::vector<Slot>> told;
+  int messages = 0;
+  v1::ImportMeshResponse response;
+  while (stream->Read(&response)) {
+    if (!response.has_ids()) continue;
+    const auto ids = Array<Slot>(response.ids().ids());
+    auto& all = told[response.ids().kind()];
+    all.insert(all.end(), ids.begin(), ids.end());
+    ++messages;
+  }
+  ASSERT_TRUE(stream->Finish().ok());
+  EXPECT_TRUE(response.has_result());
+  EXPECT_GT(messages, 2);
+  ASSERT_EQ(told[v1::ENTITY_KIND_VERTEX].size(), points.size());
+  ASSERT_EQ(told[v1::ENTITY_KIND_CELL].size(), num_cells);
+  std::vector<Point> positions;
+  for (const v1::ExportMeshResponse& chunk : Export("mesh")) {
+    for (const Point& point : Array<Point>(chunk.vertices().positions())) positions.push_back(point);
+  }
+  ASSERT_EQ(positions.size(), points.size());
+  for (size_t v = 0; v < positions.size(); ++v) {
+    EXPECT_EQ(positions[told[v1::ENTITY_KIND_VERTEX][v]], points[v]);
+  }
+}
+
+TEST_F(ImportRpcTest, AnUnknownSlotOrderIsRefused) {
+  v1::ImportMeshRequest head = ImportHead("mesh");
+  head.mutable_header()->set_slot_order(static_cast<v1::SlotOrder>(9));
+  ExpectError(ImportRequests({head}), grpc::INVALID_ARGUMENT, reason::kBadArgument, "field", "slot_order");
+}
+
 TEST_F(ImportRpcTest, ProgressIsReported) {
   const Mesh mesh = TetGrid(22, 22, 22);
   PatientContext context;
@@ -384,7 +437,7 @@ TEST_F(ImportRpcTest, StagedBytesAreBoundedOverAllImports) {
   stream->Write(ImportHead("other"));
   stream->Write(ImportPositions(SomePoints(100'000)));
   v1::ImportMeshResponse response;
-  ASSERT_TRUE(stream->Read(&response));
+  while (response.progress().done() < 100'000) ASSERT_TRUE(stream->Read(&response));
   const std::vector<v1::ImportMeshRequest> second = {ImportHead("mesh"), ImportPositions(SomePoints(40'000))};
   ExpectError(ImportRequests(second), grpc::RESOURCE_EXHAUSTED, reason::kLimitExceeded, "limit",
               "max_staged_bytes");

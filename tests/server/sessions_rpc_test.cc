@@ -72,6 +72,81 @@ TEST_F(SessionsRpcTest, CreationIsRefusedWithReasons) {
               reason::kBadArgument, "field", "duplicate_policy");
 }
 
+/// A request that stores `relations`, as pairs of kinds.
+v1::UpdateSessionRequest StoreRequest(
+    const std::string& name, const std::vector<std::pair<v1::EntityKind, v1::EntityKind>>& relations) {
+  v1::UpdateSessionRequest request;
+  request.mutable_session()->set_name(name);
+  for (const auto& [from, to] : relations) {
+    v1::Relation* relation = request.mutable_session()->mutable_settings()->add_stored_relations();
+    relation->set_from(from);
+    relation->set_to(to);
+  }
+  request.mutable_update_mask()->add_paths("settings.stored_relations");
+  return request;
+}
+
+TEST_F(SessionsRpcTest, RelationsCanBeSwitchedWhileASessionIsInUse) {
+  ASSERT_TRUE(CreateSession("mesh").ok());
+  ASSERT_TRUE(Import("mesh", TetGrid(3, 3, 3)).ok());
+  const auto update = [&](const v1::UpdateSessionRequest& request) {
+    PatientContext context;
+    v1::UpdateSessionResponse response;
+    EXPECT_TRUE(sessions().UpdateSession(&context, request, &response).ok());
+    EXPECT_EQ(response.revision(), 1);
+    return response.session();
+  };
+  const auto pair = std::make_pair(v1::ENTITY_KIND_VERTEX, v1::ENTITY_KIND_CELL);
+  const v1::Session stored = update(StoreRequest("mesh", {pair}));
+  ASSERT_THAT(stored.stored_relations(), SizeIs(1));
+  EXPECT_EQ(stored.stored_relations(0).relation().from(), v1::ENTITY_KIND_VERTEX);
+  EXPECT_EQ(stored.stored_relations(0).relation().to(), v1::ENTITY_KIND_CELL);
+  EXPECT_GT(stored.stored_relations(0).memory_bytes(), 0u);
+  EXPECT_THAT(GetSession("mesh").settings().stored_relations(), SizeIs(1));
+  EXPECT_EQ(stored.checksum().SerializeAsString(), GetSession("mesh").checksum().SerializeAsString());
+  EXPECT_THAT(update(StoreRequest("mesh", {})).stored_relations(), IsEmpty());
+}
+
+TEST_F(SessionsRpcTest, UpdatesAreRefusedWithReasons) {
+  ASSERT_TRUE(CreateSession("mesh").ok());
+  const auto pair = std::make_pair(v1::ENTITY_KIND_CELL, v1::ENTITY_KIND_CELL);
+  const auto update = [&](const v1::UpdateSessionRequest& request) {
+    PatientContext context;
+    v1::UpdateSessionResponse response;
+    return sessions().UpdateSession(&context, request, &response);
+  };
+  const auto expect_bad = [&](const v1::UpdateSessionRequest& request, const char* field) {
+    ExpectError(update(request), grpc::INVALID_ARGUMENT, reason::kBadArgument, "field", field);
+  };
+  expect_bad(StoreRequest("mesh", {pair, pair}), "stored_relations");
+  expect_bad(StoreRequest("mesh", {{v1::ENTITY_KIND_EDGE, v1::ENTITY_KIND_EDGE}}), "stored_relations");
+  ExpectError(update(StoreRequest("mesh", {{v1::ENTITY_KIND_CELL, static_cast<v1::EntityKind>(77)}})),
+              grpc::INVALID_ARGUMENT, reason::kBadEntityKind);
+  v1::UpdateSessionRequest request = StoreRequest("mesh", {pair});
+  request.mutable_update_mask()->add_paths("settings.duplicate_policy");
+  expect_bad(request, "update_mask");
+  request.clear_update_mask();
+  expect_bad(request, "update_mask");
+  request = StoreRequest("mesh", {pair});
+  request.mutable_session()->set_etag("another");
+  ExpectError(update(request), grpc::ABORTED, reason::kEtagMismatch);
+  ExpectError(update(StoreRequest("none", {})), grpc::NOT_FOUND, reason::kSessionNotFound);
+  EXPECT_THAT(GetSession("mesh").stored_relations(), IsEmpty());
+}
+
+TEST_F(SessionsRpcTest, ASessionStoresFromTheBeginningWhatItWasCreatedWith) {
+  const auto pair = std::make_pair(v1::ENTITY_KIND_CELL, v1::ENTITY_KIND_CELL);
+  v1::CreateSessionRequest request;
+  request.set_name("mesh");
+  *request.mutable_settings() = StoreRequest("", {pair}).session().settings();
+  PatientContext context;
+  v1::CreateSessionResponse response;
+  ASSERT_TRUE(sessions().CreateSession(&context, request, &response).ok());
+  ASSERT_TRUE(Import("mesh", TetGrid(2, 2, 2)).ok());
+  ASSERT_THAT(GetSession("mesh").stored_relations(), SizeIs(1));
+  EXPECT_GT(GetSession("mesh").stored_relations(0).memory_bytes(), 0u);
+}
+
 TEST_F(SessionsRpcTest, ARetriedCreationGetsTheFirstAnswer) {
   v1::CreateSessionRequest request;
   request.set_name("mesh");

@@ -152,7 +152,7 @@ TEST(ConcurrencyTest, OneOfManyImportsWins) {
       const auto outcome = (*importer)->Finish(monitor);
       if (outcome.ok()) {
         ++won;
-        EXPECT_EQ((*outcome)->info.counts[3], mesh.NumLive(EntityKind::kCell));
+        EXPECT_EQ(outcome->outcome->info.counts[3], mesh.NumLive(EntityKind::kCell));
       } else {
         EXPECT_EQ(ErrorReason(outcome.status()), reason::kSessionNotEmpty);
       }

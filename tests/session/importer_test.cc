@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "core/mesh/validate.h"
 #include "tests/session/session_support.h"
@@ -67,7 +68,7 @@ TEST_F(ImporterTest, AnyCutIntoPiecesGivesTheSameSession) {
       TestMonitor monitor;
       const auto outcome = importer->Finish(monitor);
       ASSERT_TRUE(outcome.ok()) << outcome.status();
-      EXPECT_EQ((*outcome)->revision, 1);
+      EXPECT_EQ(outcome->outcome->revision, 1);
       EXPECT_EQ(session->revision(), 1);
       EXPECT_EQ(ChecksumOf(*session), expected.checksum());
       EXPECT_TRUE(session
@@ -203,6 +204,107 @@ TEST_F(ImporterTest, RefusedDuplicatesNameTheElement) {
   ExpectStillEmpty(session);
 }
 
+/// Of the session's vertices and elements, those at the slots that `answer` tells.
+void ExpectAtToldSlots(const Session& session, const ImportAnswer& answer, const Mesh& sent) {
+  ElementModel expected;
+  const auto told = [&](EntityKind kind, Slot item) { return answer.slots[Dimension(kind)].at(item); };
+  const ElementModel model = ModelOf(sent);
+  for (const auto& [v, position] : model.vertices) {
+    expected.vertices[VertexId(told(EntityKind::kVertex, v.slot()))] = position;
+  }
+  std::array<Slot, kNumEntityKinds> items = {};
+  for (const auto& [id, element] : model.elements) {
+    auto& at = expected.elements[{id.kind, told(id.kind, items[Dimension(id.kind)]++)}];
+    at.type = element.type;
+    for (VertexId v : element.vertices) at.vertices.emplace_back(told(EntityKind::kVertex, v.slot()));
+  }
+  EXPECT_TRUE(session
+                  .Read([&](const SessionView& view) {
+                    ExpectEqualsOracle(view.mesh, expected);
+                    return absl::OkStatus();
+                  })
+                  .ok());
+}
+
+TEST_F(ImporterTest, HilbertOrderGivesSlotsThatTheAnswerTells) {
+  std::mt19937 rng(11);
+  int number = 0;
+  for (NamedMesh& named : AllMeshes()) {
+    SCOPED_TRACE(named.name);
+    const Mesh sent = ByDimension(named.mesh);
+    const SessionPtr session = daemon_.NewSession("m" + std::to_string(number++));
+    const ImportOptions options{.request_id = "x", .slot_order = SlotOrder::kHilbert};
+    const auto importer = Start(session, options);
+    StageMesh(sent, importer->staged(), rng);
+    TestMonitor monitor, monitor_again;
+    const auto answer = importer->Finish(monitor);
+    ASSERT_TRUE(answer.ok()) << answer.status();
+    ExpectAtToldSlots(*session, *answer, sent);
+    const auto retry = Start(session, options);
+    StageMesh(sent, retry->staged(), rng);
+    const auto again = retry->Finish(monitor_again);
+    ASSERT_TRUE(again.ok()) << again.status();
+    EXPECT_EQ(again->outcome, answer->outcome);
+    EXPECT_EQ(again->slots, answer->slots);
+  }
+}
+
+TEST_F(ImporterTest, AttributesAndIndicesFollowTheHilbertOrder) {
+  const Mesh sent = TetGrid(4, 4, 4);
+  const Slot num_vertices = sent.NumLive(EntityKind::kVertex), num_cells = sent.NumLive(EntityKind::kCell);
+  std::vector<double> temperatures(num_vertices);
+  std::vector<int32_t> materials(num_cells);
+  std::iota(temperatures.begin(), temperatures.end(), 0.5);
+  std::iota(materials.begin(), materials.end(), 7);
+  std::mt19937 rng(1);
+  const SessionPtr session = daemon_.NewSession();
+  const auto importer = Start(session, {.slot_order = SlotOrder::kHilbert});
+  StageMesh(sent, importer->staged(), rng);
+  ASSERT_TRUE(importer->staged().AddRows(kTemperature, BytesOf(temperatures)).ok());
+  ASSERT_TRUE(importer->staged().AddRows(kMaterial, BytesOf(materials)).ok());
+  const auto answer = importer->Finish(monitor_);
+  ASSERT_TRUE(answer.ok()) << answer.status();
+  EXPECT_FALSE(std::is_sorted(answer->slots[0].begin(), answer->slots[0].end()));
+  const auto read = session->Read([&](const SessionView& view) {
+    const auto& columns = view.mesh.attributes();
+    for (Slot v = 0; v < num_vertices; ++v) {
+      EXPECT_EQ(std::memcmp(columns[0].Row(answer->slots[0][v]).data(), &temperatures[v], 8), 0);
+    }
+    for (Slot c = 0; c < num_cells; ++c) {
+      EXPECT_EQ(std::memcmp(columns[1].Row(answer->slots[3][c]).data(), &materials[c], 4), 0);
+    }
+    return absl::OkStatus();
+  });
+  EXPECT_TRUE(read.ok());
+}
+
+TEST_F(ImporterTest, ARefusedDuplicateIsNamedByItsPlaceInTheImportInAnyOrder) {
+  const SessionPtr session = daemon_.NewSession("strict", {DuplicatePolicy::kRefuse});
+  std::mt19937 rng(1);
+  const auto importer = Start(session, {.slot_order = SlotOrder::kHilbert});
+  const Mesh grid = TetGrid(3, 3, 3);
+  StageMesh(grid, importer->staged(), rng);
+  std::vector<Slot> again;
+  for (VertexId v : grid.Vertices(CellId(77))) again.push_back(v.slot());
+  ASSERT_TRUE(importer->staged().AddElements(ElementType::kTetrahedron, Ids(again)).ok());
+  const auto outcome = importer->Finish(monitor_);
+  EXPECT_EQ(RefusalOf(outcome), (Refusal{absl::StatusCode::kInvalidArgument, reason::kDuplicateElement}));
+  const std::string count = absl::StrCat(grid.NumLive(EntityKind::kCell));
+  EXPECT_EQ(MetadataOf(outcome.status(), "index"), count);
+  ExpectStillEmpty(session);
+}
+
+TEST_F(ImporterTest, AnImportStoresWhatTheSessionStores) {
+  const Relation stored{EntityKind::kVertex, EntityKind::kCell};
+  const SessionPtr session = daemon_.NewSession("stored", {.stored_relations = {stored}});
+  const auto answer = StartTet(session)->Finish(monitor_);
+  ASSERT_TRUE(answer.ok()) << answer.status();
+  ASSERT_EQ(answer->outcome->info.stored_relations.size(), 1u);
+  EXPECT_EQ(answer->outcome->info.stored_relations[0].relation, stored);
+  EXPECT_GT(answer->outcome->info.stored_relations[0].memory_bytes, 0u);
+  EXPECT_EQ(session->Info()->settings.stored_relations, std::vector<Relation>{stored});
+}
+
 TEST_F(ImporterTest, OddElementsAreKeptWithAWarning) {
   const SessionPtr session = daemon_.NewSession();
   const auto importer = StartTet(session);
@@ -210,7 +312,7 @@ TEST_F(ImporterTest, OddElementsAreKeptWithAWarning) {
   ASSERT_TRUE(importer->staged().AddElements(ElementType::kTriangle, Ids({0, 1, 2, 2, 1, 0})).ok());
   const auto outcome = importer->Finish(monitor_);
   ASSERT_TRUE(outcome.ok()) << outcome.status();
-  const auto& warnings = (*outcome)->warnings;
+  const auto& warnings = outcome->outcome->warnings;
   ASSERT_EQ(warnings.size(), 3u);
   EXPECT_EQ(warnings[0].warning, WarningKind::kDuplicateElement);
   EXPECT_EQ(warnings[0].kind, EntityKind::kFace);
@@ -238,11 +340,11 @@ TEST_F(ImporterTest, ValidateOnlyTellsTheResultAndLeavesTheSessionEmpty) {
   const SessionPtr session = daemon_.NewSession();
   const auto outcome = StartTet(session, {.validate_only = true})->Finish(monitor_);
   ASSERT_TRUE(outcome.ok());
-  EXPECT_EQ((*outcome)->revision, 0);
-  EXPECT_EQ((*outcome)->info.counts[3], 1u);
+  EXPECT_EQ(outcome->outcome->revision, 0);
+  EXPECT_EQ(outcome->outcome->info.counts[3], 1u);
   ExpectStillEmpty(session);
   ASSERT_TRUE(StartTet(session)->Finish(again).ok());
-  EXPECT_EQ(ChecksumOf(*session), (*outcome)->info.checksum);
+  EXPECT_EQ(ChecksumOf(*session), outcome->outcome->info.checksum);
 }
 
 TEST_F(ImporterTest, ARetryGetsTheFirstAnswerHoweverItIsCut) {
@@ -255,8 +357,8 @@ TEST_F(ImporterTest, ARetryGetsTheFirstAnswerHoweverItIsCut) {
     StageMesh(mesh, importer->staged(), rng);
     const auto outcome = importer->Finish(monitor_);
     ASSERT_TRUE(outcome.ok()) << outcome.status();
-    if (first == nullptr) first = *outcome;
-    EXPECT_EQ(*outcome, first);
+    if (first == nullptr) first = outcome->outcome;
+    EXPECT_EQ(outcome->outcome, first);
   }
   EXPECT_EQ(RefusalOf(StartTet(session, {.request_id = "x"})->Finish(monitor_)),
             (Refusal{absl::StatusCode::kInvalidArgument, reason::kRequestIdReused}));

@@ -47,6 +47,52 @@ TEST_F(SessionTest, EachBatchIsOneRevision) {
   EXPECT_EQ(session->revision(), 2);
 }
 
+TEST_F(SessionTest, RelationsAreSwitchedAtAnyMomentWithoutARevision) {
+  const SessionPtr session = daemon_.NewSession();
+  const Relation vertex_cells{EntityKind::kVertex, EntityKind::kCell};
+  const Relation cell_cells{EntityKind::kCell, EntityKind::kCell};
+  const auto stored = [&] { return session->Info()->settings.stored_relations; };
+  MustApply(*session, AddTet());
+  const uint64_t before = session->Info()->memory_bytes;
+  ASSERT_TRUE(session->StoreRelations({cell_cells, vertex_cells}, "").ok());
+  EXPECT_THAT(stored(), ElementsAre(vertex_cells, cell_cells));
+  MustApply(*session, AddTet());
+  const absl::StatusOr<SessionInfo> info = session->Info();
+  EXPECT_EQ(info->revision, 2);
+  uint64_t tables = 0;
+  for (const StoredRelation& relation : info->stored_relations) tables += relation.memory_bytes;
+  EXPECT_GT(tables, 0u);
+  EXPECT_GE(info->memory_bytes, before + tables);
+  ASSERT_TRUE(session->StoreRelations({cell_cells}, info->etag).ok());
+  EXPECT_THAT(stored(), ElementsAre(cell_cells));
+  ASSERT_TRUE(session->StoreRelations({}, "").ok());
+  EXPECT_THAT(stored(), IsEmpty());
+  EXPECT_EQ(session->revision(), 2);
+}
+
+TEST_F(SessionTest, ASwitchThatIsRefusedChangesNothing) {
+  const Relation first{EntityKind::kCell, EntityKind::kEdge};
+  const auto fill = [&](Session& session) {
+    MustApply(session, AddTet());
+    MustApply(session, {AddSomeVertices(20'000)});
+    ASSERT_TRUE(session.StoreRelations({first}, "").ok());
+  };
+  const SessionPtr probe = daemon_.NewSession();
+  fill(*probe);
+  Daemon daemon(Limits{.max_session_bytes = probe->Info()->memory_bytes + 1000});
+  const SessionPtr session = daemon.NewSession();
+  fill(*session);
+  ExpectRefused(*session, absl::StatusCode::kAborted, reason::kEtagMismatch,
+                [&] { return session->StoreRelations({}, "another"); });
+  const ErrorDetail limit =
+      ExpectRefused(*session, absl::StatusCode::kResourceExhausted, reason::kLimitExceeded,
+                    [&] { return session->StoreRelations(kStorableRelations, ""); });
+  EXPECT_EQ(limit.Find("limit"), "max_session_bytes");
+  EXPECT_THAT(session->Info()->settings.stored_relations, ElementsAre(first));
+  ASSERT_TRUE(daemon.registry().Delete(session->name(), "").ok());
+  EXPECT_EQ(session->StoreRelations({}, "").code(), absl::StatusCode::kNotFound);
+}
+
 TEST_F(SessionTest, ABatchWithoutEditsAnswersWithTheCurrentState) {
   const SessionPtr session = daemon_.NewSession();
   MustApply(*session, AddTet());

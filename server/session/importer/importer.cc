@@ -9,6 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/time/clock.h"
 #include "server/session/answer_memory.h"
+#include "server/session/fingerprint.h"
 #include "server/session/session_errors.h"
 #include "spdlog/spdlog.h"
 
@@ -69,16 +70,37 @@ Importer::Importer(SessionPtr session, std::unique_ptr<ImportGate::Ticket> ticke
       options_(options),
       staged_(session_->limits(), std::move(staged)) {}
 
-absl::StatusOr<Importer::OutcomePtr> Importer::Finish(ImportMonitor& monitor) {
+absl::StatusOr<ImportAnswer> Importer::Finish(ImportMonitor& monitor) {
   DYNMESH_RETURN_IF_ERROR(CheckCounts());
   if (options_.request_id.empty() || options_.validate_only) return BuildAndAdopt(monitor);
-  const uint64_t fingerprint = staged_.Fingerprint();
+  const uint64_t fingerprint = Fingerprint();
   DYNMESH_ASSIGN_OR_RETURN(OutcomePtr remembered, session_->FindImport(options_.request_id, fingerprint));
-  if (remembered != nullptr) return remembered;
+  if (remembered != nullptr) return AnswerAgain(std::move(remembered), monitor);
   DYNMESH_RETURN_IF_ERROR(session_->CheckEmpty());
-  DYNMESH_ASSIGN_OR_RETURN(OutcomePtr outcome, BuildAndAdopt(monitor));
-  session_->RememberImport(options_.request_id, fingerprint, outcome);
-  return outcome;
+  DYNMESH_ASSIGN_OR_RETURN(ImportAnswer answer, BuildAndAdopt(monitor));
+  session_->RememberImport(options_.request_id, fingerprint, answer.outcome);
+  return answer;
+}
+
+uint64_t Importer::Fingerprint() const {
+  class Fingerprint fingerprint;
+  fingerprint.AddNumber(staged_.Fingerprint());
+  fingerprint.AddNumber(static_cast<uint64_t>(options_.slot_order));
+  return fingerprint.value();
+}
+
+BulkOptions Importer::BuildOptions() const {
+  return {{session_->duplicates(), ToMeshLimits(session_->limits())}, options_.slot_order};
+}
+
+// The slots of the first answer follow from what was sent: they are not kept, but found again.
+absl::StatusOr<ImportAnswer> Importer::AnswerAgain(OutcomePtr remembered, ImportMonitor& monitor) {
+  ImportAnswer answer{std::move(remembered), {}};
+  if (options_.slot_order == SlotOrder::kCaller) return answer;
+  MeshBuilder builder(BuildOptions(), session_->limits(), monitor);
+  DYNMESH_RETURN_IF_ERROR(builder.Build(std::move(staged_)).status());
+  answer.slots = std::move(builder.slots());
+  return answer;
 }
 
 absl::Status Importer::CheckCounts() const {
@@ -87,11 +109,21 @@ absl::Status Importer::CheckCounts() const {
   return staged_.CheckColumns();
 }
 
-absl::StatusOr<Importer::OutcomePtr> Importer::BuildAndAdopt(ImportMonitor& monitor) {
-  const absl::Time begin = absl::Now();
-  const Limits& limits = session_->limits();
-  MeshBuilder builder({session_->settings().duplicates, ToMeshLimits(limits)}, limits, monitor);
+// With the relations that the session stores, so that Adopt() need not fill them under its lock.
+absl::StatusOr<Mesh> Importer::Build(MeshBuilder& builder) {
   DYNMESH_ASSIGN_OR_RETURN(Mesh mesh, builder.Build(std::move(staged_)));
+  DYNMESH_ASSIGN_OR_RETURN(const std::vector<Relation> stored,
+                           session_->ReadAs<std::vector<Relation>>([](const SessionView& view) {
+                             return absl::StatusOr<std::vector<Relation>>(StoredRelationsOf(view.mesh));
+                           }));
+  DYNMESH_RETURN_IF_ERROR(StoreJust(mesh, stored, session_->limits().max_session_bytes));
+  return mesh;
+}
+
+absl::StatusOr<ImportAnswer> Importer::BuildAndAdopt(ImportMonitor& monitor) {
+  const absl::Time begin = absl::Now();
+  MeshBuilder builder(BuildOptions(), session_->limits(), monitor);
+  DYNMESH_ASSIGN_OR_RETURN(Mesh mesh, Build(builder));
   auto outcome = std::make_shared<ImportOutcome>();
   outcome->warnings = builder.warnings();
   // Described before others can edit it: the answer speaks of the import alone.
@@ -107,7 +139,7 @@ absl::StatusOr<Importer::OutcomePtr> Importer::BuildAndAdopt(ImportMonitor& moni
                outcome->info.counts[0], outcome->info.counts[3], options_.validate_only,
                absl::ToInt64Milliseconds(absl::Now() - begin));
   TrimHeap();
-  return OutcomePtr(std::move(outcome));
+  return ImportAnswer{std::move(outcome), std::move(builder.slots())};
 }
 
 }  // namespace dynmesh

@@ -1,6 +1,7 @@
 #ifndef DYNMESH_SERVER_SESSION_IMPORTER_IMPORTER_H_
 #define DYNMESH_SERVER_SESSION_IMPORTER_IMPORTER_H_
 
+#include <array>
 #include <atomic>
 #include <cstdint>
 #include <memory>
@@ -24,12 +25,20 @@ struct ImportOutcome {
   std::vector<MeshWarning> warnings;
 };
 
+/// What Importer::Finish gives.
+struct ImportAnswer {
+  std::shared_ptr<const ImportOutcome> outcome;
+  /// slots[kind][i] = slot of the i-th item of a kind; empty with SlotOrder::kCaller.
+  std::array<Permutation, kNumEntityKinds> slots;
+};
+
 /// The fields of ImportHeader but the session.
 struct ImportOptions {
   uint64_t num_vertices = 0;  ///< announced; 0: not
   uint64_t num_elements = 0;
   bool validate_only = false;
   std::string request_id = {};
+  SlotOrder slot_order = SlotOrder::kCaller;
 };
 
 /// Counts the imports that are under way in a daemon, and the bytes that they have staged. Thread safety:
@@ -85,7 +94,7 @@ class Importer {
 
   /// Errors: INVALID_ARGUMENT COUNT_MISMATCH and those of MeshBuilder; FAILED_PRECONDITION SESSION_NOT_EMPTY
   /// when somebody was faster; CANCELLED. To be called once, from a heavy executor.
-  absl::StatusOr<std::shared_ptr<const ImportOutcome>> Finish(ImportMonitor& monitor);
+  absl::StatusOr<ImportAnswer> Finish(ImportMonitor& monitor);
 
  private:
   using OutcomePtr = std::shared_ptr<const ImportOutcome>;
@@ -93,7 +102,11 @@ class Importer {
   Importer(SessionPtr session, std::unique_ptr<ImportGate::Ticket> ticket, Lease staged,
            const ImportOptions& options);
   absl::Status CheckCounts() const;
-  absl::StatusOr<OutcomePtr> BuildAndAdopt(ImportMonitor& monitor);
+  uint64_t Fingerprint() const;
+  BulkOptions BuildOptions() const;
+  absl::StatusOr<ImportAnswer> AnswerAgain(OutcomePtr remembered, ImportMonitor& monitor);
+  absl::StatusOr<ImportAnswer> BuildAndAdopt(ImportMonitor& monitor);
+  absl::StatusOr<Mesh> Build(MeshBuilder& builder);
 
   const SessionPtr session_;
   const std::unique_ptr<ImportGate::Ticket> ticket_;

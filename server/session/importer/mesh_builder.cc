@@ -23,10 +23,7 @@ absl::Status VertexOutOfRange(Slot vertex, uint64_t num_vertices, uint64_t index
 absl::StatusOr<Mesh> MeshBuilder::Build(StagedMesh staged) {
   num_vertices_ = staged.num_vertices();
   total_ = staged.num_vertices() + staged.num_elements();
-  BulkOptions options;
-  options.mesh = mesh_options_;
-  options.progress = [this](uint64_t done, uint64_t total) { return OnProgress(done, total); };
-  BulkBuilder builder(options);
+  BulkBuilder builder(options_);
   DYNMESH_RETURN_IF_ERROR(AddVertices(staged.positions(), builder));
   for (EntityKind kind : {EntityKind::kEdge, EntityKind::kFace, EntityKind::kCell}) {
     std::list<StagedRun>& runs = staged.runs(kind);
@@ -36,6 +33,7 @@ absl::StatusOr<Mesh> MeshBuilder::Build(StagedMesh staged) {
   absl::StatusOr<BulkResult> result = std::move(builder).Finish();
   if (!result.ok()) return WithImportIndex(result.status());
   CollectWarnings(*result);
+  slots_ = std::move(result->slots);
   DYNMESH_RETURN_IF_ERROR(CheckMemory(result->mesh.memory_bytes()));
   for (StagedColumn& column : staged.columns()) DYNMESH_RETURN_IF_ERROR(AddColumn(column, result->mesh));
   DYNMESH_RETURN_IF_ERROR(result->mesh.Commit());
@@ -104,11 +102,13 @@ absl::Status MeshBuilder::AddColumn(StagedColumn& column, Mesh& mesh) {
   DYNMESH_RETURN_IF_ERROR(mesh.AddAttribute(column.spec));
   const int index = mesh.FindAttribute(column.spec.name, column.spec.kind);
   const size_t row_bytes = column.spec.row_bytes();
-  Slot slot = 0;
+  const Permutation& slots = slots_[Dimension(column.spec.kind)];
+  size_t item = 0;
   while (!column.rows.empty()) {
     const std::string block = column.rows.TakeFront();
     const auto* rows = reinterpret_cast<const uint8_t*>(block.data());
-    for (size_t offset = 0; offset < block.size(); offset += row_bytes, ++slot) {
+    for (size_t offset = 0; offset < block.size(); offset += row_bytes, ++item) {
+      const Slot slot = slots.empty() ? item : slots[item];
       DYNMESH_RETURN_IF_ERROR(mesh.SetAttribute(index, slot, absl::MakeConstSpan(rows + offset, row_bytes)));
     }
     DYNMESH_RETURN_IF_ERROR(CheckCancelled());

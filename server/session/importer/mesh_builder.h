@@ -1,6 +1,7 @@
 #ifndef DYNMESH_SERVER_SESSION_IMPORTER_MESH_BUILDER_H_
 #define DYNMESH_SERVER_SESSION_IMPORTER_MESH_BUILDER_H_
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -24,11 +25,15 @@ class ImportMonitor {
 
 /// Turns what an import has staged into a mesh at revision 1, and frees it on the way.
 ///
-/// Vertices first, then elements by ascending dimension, in bulk: element i of a kind gets slot i.
+/// Vertices first, then elements by ascending dimension, in bulk. To be used once.
 class MeshBuilder {
  public:
-  MeshBuilder(const MeshOptions& options, const Limits& limits, ImportMonitor& monitor)
-      : mesh_options_(options), limits_(limits), monitor_(monitor) {}
+  MeshBuilder(const BulkOptions& options, const Limits& limits, ImportMonitor& monitor)
+      : options_(options), limits_(limits), monitor_(monitor) {
+    options_.progress = [this](uint64_t done, uint64_t total) { return OnProgress(done, total); };
+  }
+  MeshBuilder(const MeshBuilder&) = delete;
+  MeshBuilder& operator=(const MeshBuilder&) = delete;
 
   /// Errors: INVALID_ARGUMENT UNKNOWN_ENTITY (a vertex id out of range; metadata index, ids),
   /// DUPLICATE_ELEMENT (if so opted; metadata index); RESOURCE_EXHAUSTED LIMIT_EXCEEDED; CANCELLED.
@@ -36,6 +41,8 @@ class MeshBuilder {
 
   /// Of the mesh that Build made.
   const std::vector<MeshWarning>& warnings() const { return warnings_.warnings(); }
+  /// As BulkResult::slots.
+  std::array<Permutation, kNumEntityKinds>& slots() { return slots_; }
 
  private:
   /// `count` elements of a kind that follow each other in the import.
@@ -55,10 +62,11 @@ class MeshBuilder {
   /// A "position" among the elements of a kind, as "index" among all elements of the import.
   absl::Status WithImportIndex(const absl::Status& status) const;
 
-  const MeshOptions mesh_options_;
+  BulkOptions options_;
   const Limits limits_;
   ImportMonitor& monitor_;
   WarningCollector warnings_;
+  std::array<Permutation, kNumEntityKinds> slots_;
   std::vector<RunPlace> places_;
   uint64_t num_vertices_ = 0;
   uint64_t total_ = 0;

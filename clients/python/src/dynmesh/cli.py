@@ -12,12 +12,15 @@ import sys
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
 from .cli_watch import watch
 from .client import DEFAULT_TARGET, DEFAULT_TIMEOUT_S, Client, connect
 from .daemon import find_daemon
 from .errors import DynmeshError
 from .files import read_mesh
 from .info import SessionInfo
+from .session import Session
 from .transfer import ImportResult
 
 _EXIT_ERROR, _EXIT_INTERRUPTED = 1, 130
@@ -94,19 +97,44 @@ def _add_writing(commands: Any) -> None:
     create.add_argument(
         "--duplicates", choices=("keep", "refuse"), default="keep", help="equal elements (keep)"
     )
-    _add_attributes(create)
+    _add_import_options(create)
     fill = _command(commands, "import", _import, "Fill an empty session from a mesh file.")
     fill.add_argument("name", metavar="NAME")
     fill.add_argument("file", metavar="FILE", help="any format that meshio reads")
-    _add_attributes(fill)
+    _add_import_options(fill)
+    store = _command(
+        commands,
+        "store",
+        _store,
+        "Keep just these relations as tables: faster queries for memory and slower edits.",
+    )
+    store.add_argument("name", metavar="NAME")
+    store.add_argument(
+        "relations",
+        metavar="RELATION",
+        nargs="+",
+        type=_relation,
+        help="cell-edge, vertex-cell, edge-cell, vertex-face, cell-cell, vertex-vertex; or none",
+    )
     remove = _command(commands, "rm", _rm, "Delete a session. Asks first when typed at a terminal.")
     remove.add_argument("name", metavar="NAME")
     remove.add_argument("--yes", action="store_true", help="do not ask")
 
 
-def _add_attributes(parser: argparse.ArgumentParser) -> None:
+def _add_import_options(parser: argparse.ArgumentParser) -> None:
     help_text = "point and cell data to take, separated by commas; empty for none (default: all)"
     parser.add_argument("--attributes", metavar="NAMES", type=_names, help=help_text)
+    parser.add_argument(
+        "--slot-order",
+        choices=("caller", "hilbert"),
+        default="caller",
+        help="ids in the order of the file, or along a space-filling curve, which makes queries faster (caller)",
+    )
+    parser.add_argument(
+        "--slot-map",
+        metavar="FILE.npz",
+        help="where to write the ids that --slot-order hilbert gave: an array for each kind, by position in the file",
+    )
 
 
 def _add_reading(commands: Any) -> None:
@@ -144,7 +172,7 @@ def _create(args: argparse.Namespace) -> None:
         if mesh is None:
             return _print_info(args, session.info())
         try:
-            result = session.import_mesh(mesh, attributes=args.attributes)
+            result = _import_mesh(args, session, mesh)
         except BaseException:
             session.delete()
             raise
@@ -154,7 +182,21 @@ def _create(args: argparse.Namespace) -> None:
 def _import(args: argparse.Namespace) -> None:
     mesh = read_mesh(args.file)
     with _client(args) as client:
-        _print_import(args, client.session(args.name).import_mesh(mesh, attributes=args.attributes))
+        _print_import(args, _import_mesh(args, client.session(args.name), mesh))
+
+
+def _import_mesh(args: argparse.Namespace, session: Session, mesh: Any) -> ImportResult:
+    result = session.import_mesh(mesh, attributes=args.attributes, slot_order=args.slot_order)
+    if args.slot_map:
+        with open(args.slot_map, "wb") as file:  # np.savez would change the name
+            np.savez(file, **{str(kind): ids for kind, ids in result.slots.items()})
+    return result
+
+
+def _store(args: argparse.Namespace) -> None:
+    with _client(args) as client:
+        wanted = [relation for relation in args.relations if relation is not None]
+        _print_info(args, client.session(args.name).store_relations(wanted))
 
 
 def _export(args: argparse.Namespace) -> None:
@@ -218,6 +260,15 @@ def _positive(text: str) -> int:
     return number
 
 
+def _relation(text: str) -> tuple[str, str] | None:
+    if text == "none":
+        return None
+    source, dash, target = text.partition("-")
+    if not dash:
+        raise argparse.ArgumentTypeError(f"{text} is not a pair of kinds such as vertex-cell")
+    return source, target
+
+
 def _names(text: str) -> list[str]:
     return [name for name in text.split(",") if name]
 
@@ -261,6 +312,8 @@ def _describe(info: SessionInfo) -> str:
     if info.bounds is not None:
         low, high = (" ".join(f"{x:g}" for x in corner) for corner in info.bounds)
         lines.append(f"bounds     ({low}) to ({high})")
+    for (source, target), size in info.stored_relations.items():
+        lines.append(f"stored     {source}-{target}: {size / 2**20:.1f} MiB")
     for spec in info.attributes:
         lines.append(f"attribute  {spec.name}: {spec.dtype}[{spec.components}] of {spec.kind}")
     return "\n".join(lines)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import uuid
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from types import TracebackType
 
 import grpc
@@ -11,6 +11,7 @@ import grpc
 from ._calls import DEFAULT_MAX_MESSAGE_BYTES, Caller
 from .errors import InvalidArgumentError
 from .info import SessionInfo, info_from_proto
+from .relations import RelationLike, relations_to_proto
 from .session import Session
 from .v1 import sessions_pb2, sessions_pb2_grpc
 
@@ -71,6 +72,7 @@ class Client:
         name: str,
         *,
         duplicates: str = "keep",
+        stored_relations: Iterable[RelationLike] = (),
         request_id: str | None = None,
         timeout: float | None = None,
     ) -> Session:
@@ -82,6 +84,8 @@ class Client:
             1-64 characters of [A-Za-z0-9_.-], beginning with a letter or digit.
         duplicates : "keep" or "refuse"
             What happens to an element that equals a live one (same type, same vertices up to symmetry).
+        stored_relations : iterable of (kind, kind)
+            Relations to keep as tables: as in `Session.store_relations`.
         request_id : str, optional
             A retry with the same id gets the first answer. Default: a new one.
 
@@ -91,9 +95,12 @@ class Client:
         """
         if duplicates not in _POLICIES:
             raise InvalidArgumentError(f'duplicates is "keep" or "refuse", not {duplicates!r}')
+        settings = sessions_pb2.SessionSettings(
+            duplicate_policy=_POLICIES[duplicates], stored_relations=relations_to_proto(stored_relations)
+        )
         request = sessions_pb2.CreateSessionRequest(
             name=name,
-            settings=sessions_pb2.SessionSettings(duplicate_policy=_POLICIES[duplicates]),
+            settings=settings,
             request_id=request_id or uuid.uuid4().hex,
         )
         self._caller.unary(self._sessions.CreateSession, request, timeout, repeatable=True)

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 from .arrays import Ids, Points, from_bytes
 from .checksum import Checksum
 from .kinds import EntityKind
+from .relations import Relation, relation_from_proto
 from .v1 import sessions_pb2, types_pb2
 
 _TYPE_NAMES = {types_pb2.ATTRIBUTE_TYPE_FLOAT64: "float64", types_pb2.ATTRIBUTE_TYPE_INT32: "int32"}
@@ -70,6 +71,8 @@ class SessionInfo:
         Tells this session from an earlier or later one of the same name.
     euler_characteristic : int
         V - E + F - C.
+    stored_relations : dict of (EntityKind, EntityKind) to int
+        Relations that are kept as tables, and the bytes of each, which are part of `memory_bytes`.
     bounds : float64[2, 3] or None
         Smallest and largest coordinates; None without vertices.
     """
@@ -90,6 +93,7 @@ class SessionInfo:
     memory_bytes: int
     followers: int
     attributes: tuple[AttributeSpec, ...]
+    stored_relations: dict[Relation, int]
     bounds: Points | None
 
     def to_dict(self) -> dict[str, Any]:
@@ -111,6 +115,9 @@ class SessionInfo:
             "memory_bytes": self.memory_bytes,
             "followers": self.followers,
             "attributes": [{**spec._asdict(), "kind": str(spec.kind)} for spec in self.attributes],
+            "stored_relations": {
+                f"{source}-{target}": size for (source, target), size in self.stored_relations.items()
+            },
             "bounds": None if self.bounds is None else self.bounds.tolist(),
         }
 
@@ -151,6 +158,10 @@ def info_from_proto(message: sessions_pb2.Session) -> SessionInfo:
         memory_bytes=message.memory_bytes,
         followers=message.followers,
         attributes=tuple(_spec_from_proto(spec) for spec in message.attributes),
+        stored_relations={
+            relation_from_proto(stored.relation): stored.memory_bytes
+            for stored in message.stored_relations
+        },
         bounds=_bounds(message),
     )
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import uuid
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterable
 from typing import TYPE_CHECKING
 
 import grpc
+from google.protobuf import field_mask_pb2
 from numpy.typing import ArrayLike
 
 from ._calls import Caller
@@ -16,10 +17,12 @@ from .edit import EditBatch, EditResult, Transaction
 from .edit_stream import EditStream
 from .errors import InvalidArgumentError, UnimplementedError
 from .files import PathLike, read_mesh
+from .info import SessionInfo, info_from_proto
 from .meshes import Cells, as_mesh_data
 from .mirror import Mirror, Update
 from .mirror_state import MirrorState
 from .progress import Progress
+from .relations import RelationLike, relations_to_proto
 from .session_reader import FOREVER, SessionReader
 from .transfer import ImportResult, import_requests, read_import
 from .v1 import edits_pb2, edits_pb2_grpc, sessions_pb2, subscriptions_pb2, subscriptions_pb2_grpc
@@ -29,6 +32,7 @@ if TYPE_CHECKING:
 
 _MAX_INTERVAL_S = 3600
 
+_SLOT_ORDERS = {"caller": sessions_pb2.SLOT_ORDER_CALLER, "hilbert": sessions_pb2.SLOT_ORDER_HILBERT}
 _CODECS = {
     "auto": subscriptions_pb2.DELTA_CODEC_UNSPECIFIED,
     "raw": subscriptions_pb2.DELTA_CODEC_RAW,
@@ -67,6 +71,37 @@ class Session(SessionReader):
         request = sessions_pb2.DeleteSessionRequest(name=self.name, etag=etag)
         return self._caller.unary(self._sessions.DeleteSession, request, timeout, repeatable=False).revision
 
+    def store_relations(
+        self, relations: Iterable[RelationLike], *, etag: str = "", timeout: float | None = None
+    ) -> SessionInfo:
+        """Keeps just these relations as tables from now on, current with every edit.
+
+        Queries over them are faster, edits slower, and memory more (`SessionInfo.stored_relations`). Answers are
+        the same either way. Takes a moment for each relation that is switched on; no revision is made.
+
+        Parameters
+        ----------
+        relations : iterable of (kind, kind)
+            Of ("cell", "edge"), ("vertex", "cell"), ("edge", "cell"), ("vertex", "face"), ("cell", "cell"),
+            ("vertex", "vertex"); none for none.
+        etag : str, optional
+            As in `delete`.
+
+        Raises
+        ------
+        InvalidArgumentError
+            Another relation, or one that is named twice.
+        ResourceExhaustedError
+            LIMIT_EXCEEDED ``max_session_bytes``; nothing is switched then.
+        """
+        settings = sessions_pb2.SessionSettings(stored_relations=relations_to_proto(relations))
+        request = sessions_pb2.UpdateSessionRequest(
+            session=sessions_pb2.Session(name=self.name, etag=etag, settings=settings),
+            update_mask=field_mask_pb2.FieldMask(paths=["settings.stored_relations"]),
+        )
+        reply = self._caller.unary(self._sessions.UpdateSession, request, timeout, repeatable=True)
+        return info_from_proto(reply.session)
+
     # ---- Writing ----
 
     def import_mesh(
@@ -75,6 +110,7 @@ class Session(SessionReader):
         cells: Cells | None = None,
         *,
         attributes: Collection[str] | None = None,
+        slot_order: str = "caller",
         validate_only: bool = False,
         progress: bool | None = None,
         timeout: float | None = None,
@@ -82,7 +118,7 @@ class Session(SessionReader):
         """Fills this empty session with a mesh, as revision 1.
 
         Vertex i gets id i; element i of all blocks of a kind gets id i of that kind. Nothing is merged,
-        reordered or repaired. Nobody sees anything before the result.
+        reordered or repaired, unless ``slot_order`` asks for it. Nobody sees anything before the result.
 
         Parameters
         ----------
@@ -92,6 +128,10 @@ class Session(SessionReader):
         cells : mapping or iterable of (type, int[m, k]), optional
         attributes : collection of str, optional
             Names of the point and cell data to take. Default: all.
+        slot_order : "caller" or "hilbert"
+            "hilbert" gives ids along a space-filling curve: queries over neighbours are up to ten times faster
+            then, and deltas up to four times smaller, than with ids that are scattered in space.
+            `ImportResult.slots` tells the ids.
         validate_only : bool
             Everything is checked and the result computed, but the session stays empty.
         timeout : float, optional
@@ -106,8 +146,18 @@ class Session(SessionReader):
         """
         if isinstance(mesh, (str, bytes)) or hasattr(mesh, "__fspath__"):
             mesh = read_mesh(mesh)  # type: ignore[arg-type]
+        if slot_order not in _SLOT_ORDERS:
+            raise InvalidArgumentError(
+                f'slot_order is "caller" or "hilbert", not {slot_order!r}', reason="BAD_ARGUMENT"
+            )
         data = as_mesh_data(mesh, cells, attributes)
-        requests = import_requests(self.name, data, validate_only, _new_request_id())
+        header = sessions_pb2.ImportHeader(
+            session=self.name,
+            validate_only=validate_only,
+            request_id=_new_request_id(),
+            slot_order=_SLOT_ORDERS[slot_order],
+        )
+        requests = import_requests(header, data)
         with Progress("importing", progress) as bar:
             return read_import(
                 self._caller.stream(

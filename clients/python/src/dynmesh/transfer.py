@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import CHUNK_BYTES, concatenate, f64_bytes, from_bytes, u32_bytes
+from .arrays import CHUNK_BYTES, Ids, concatenate, f64_bytes, from_bytes, u32_bytes
 from .columns import Column, values_bytes, values_from_proto
 from .errors import InternalError
 from .info import MeshWarning, SessionInfo, info_from_proto, warning_from_proto
@@ -23,24 +23,27 @@ from .v1 import sessions_pb2, types_pb2
 
 @dataclass(frozen=True)
 class ImportResult:
-    """What an import made: the session as it was right after, and what deserves a look."""
+    """What an import made: the session as it was right after, and what deserves a look.
+
+    Attributes
+    ----------
+    slots : dict of EntityKind to uint32[n]
+        With ``slot_order="hilbert"``: ``slots[kind][i]`` is the id that the i-th item of a kind got. Else empty:
+        item i got id i.
+    """
 
     revision: int
     info: SessionInfo
     warnings: tuple[MeshWarning, ...]
+    slots: dict[EntityKind, Ids]
 
 
 def import_requests(
-    session: str, mesh: MeshData, validate_only: bool, request_id: str
+    header: sessions_pb2.ImportHeader, mesh: MeshData
 ) -> Iterator[sessions_pb2.ImportMeshRequest]:
-    """The messages of an import: header, then points, elements and attributes in chunks."""
-    header = sessions_pb2.ImportHeader(
-        session=session,
-        num_vertices=len(mesh.points),
-        num_elements=mesh.num_elements,
-        validate_only=validate_only,
-        request_id=request_id,
-    )
+    """The messages of an import: `header` with the counts, then points, elements and attributes in chunks."""
+    header.num_vertices = len(mesh.points)
+    header.num_elements = mesh.num_elements
     yield sessions_pb2.ImportMeshRequest(header=header)
     for rows in _chunks(mesh.points):
         yield sessions_pb2.ImportMeshRequest(positions=f64_bytes(rows))
@@ -55,12 +58,18 @@ def import_requests(
 
 def read_import(replies: Iterable[sessions_pb2.ImportMeshResponse], progress: Progress) -> ImportResult:
     """Follows an import to its result."""
+    pieces: dict[EntityKind, list[NDArray[Any]]] = defaultdict(list)
     for reply in replies:
-        if reply.HasField("result"):
+        part = reply.WhichOneof("part")
+        if part == "progress":
+            progress.set(reply.progress.phase, reply.progress.done, reply.progress.total)
+        elif part == "ids":
+            pieces[EntityKind(reply.ids.kind)].append(from_bytes(reply.ids.ids, "<u4"))
+        elif part == "result":
             result = reply.result
             warnings = tuple(warning_from_proto(w) for w in result.warnings)
-            return ImportResult(result.revision, info_from_proto(result.session), warnings)
-        progress.set(reply.progress.phase, reply.progress.done, reply.progress.total)
+            slots = {kind: concatenate(ids, np.uint32) for kind, ids in pieces.items()}
+            return ImportResult(result.revision, info_from_proto(result.session), warnings, slots)
     raise InternalError("the import ended without a result")
 
 
