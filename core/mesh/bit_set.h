@@ -5,6 +5,7 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <vector>
 
 #include "core/mesh/ids.h"
@@ -102,11 +103,15 @@ class BitSet {
     members.resize(count_ + 8);  // each step writes eight, of which it keeps some
     Slot* out = members.data();
     for (size_t word = NextWord(0); word != kNone; word = NextWord(word + 1)) {
-      uint64_t bits = words_[word];
-      for (Slot base = word * 64; bits != 0; bits >>= 8, base += 8) {
-        const Places& places = kPlaces[bits & 255];
-        for (int i = 0; i < 8; ++i) out[i] = base + places[i];
-        out += kSizes[bits & 255];
+      const uint64_t bits = words_[word];
+      for (int byte = 0; byte < 8; ++byte) {  // all of them: where a word ends cannot be foreseen
+        const unsigned present = bits >> (8 * byte) & 255;
+        const Slot base = word * 64 + 8 * byte;
+        EightSlots places;
+        std::memcpy(&places, kPlaces[present].data(), sizeof(places));
+        places += base;
+        std::memcpy(out, &places, sizeof(places));
+        out += kSizes[present];
       }
     }
     members.resize(count_);
@@ -138,6 +143,8 @@ class BitSet {
   }
   static const std::array<Places, 256> kPlaces;
   static const std::array<uint8_t, 256> kSizes;
+
+  using EightSlots = Slot __attribute__((vector_size(8 * sizeof(Slot))));
 
   void Grow(size_t word) {
     words_.resize(word + 1);

@@ -15,11 +15,11 @@ namespace dynmesh {
 
 /// For each lower entity the entities of the next dimension that use it: many small multisets in one pool.
 ///
-/// An entry stands once for each use, so a degenerate face that uses an edge twice is listed twice. The
-/// order within a list is arbitrary.
+/// An entry stands once for each use, so a degenerate face that uses an edge twice is listed twice. Lists of
+/// up to kIndexedLength entries ascend; longer ones are in no order.
 ///
-/// Cost: Add amortised O(1). Remove O(length) up to kIndexedLength entries; beyond that positions are
-/// kept in a hash table and it is O(1), so that a hub of a million faces is torn down in linear time.
+/// Cost: Add and Remove O(length) up to kIndexedLength entries; beyond that positions are kept in a hash
+/// table and both are O(1), so that a hub of a million faces is torn down in linear time.
 /// Invalidates: Add and Remove invalidate all spans.
 template <typename UpperId>
 class IncidenceLists {
@@ -36,20 +36,29 @@ class IncidenceLists {
   void Add(Slot lower, UpperId upper, uint32_t first_room = 2) {
     lists_.PushBack(lower, upper, first_room);
     const uint32_t length = lists_.Length(lower);
-    if (length > kIndexedLength) IndexFrom(lower, length == kIndexedLength + 1 ? 0 : length - 1);
+    if (length > kIndexedLength) return IndexFrom(lower, length == kIndexedLength + 1 ? 0 : length - 1);
+    const auto entries = lists_.MutableOf(lower);
+    uint32_t place = length - 1;
+    for (; place > 0 && upper < entries[place - 1]; --place) entries[place] = entries[place - 1];
+    entries[place] = upper;
   }
 
   /// Removes one entry. REQUIRES: it is there.
   void Remove(Slot lower, UpperId upper) {
     const uint32_t position = Position(lower, upper);
     const uint32_t last = lists_.Length(lower) - 1;
-    if (last >= kIndexedLength) IndexRemoved(lower, position, last);
     const auto entries = lists_.MutableOf(lower);
-    entries[position] = entries[last];
+    if (last >= kIndexedLength) {
+      IndexRemoved(lower, position, last);
+      entries[position] = entries[last];
+      if (last == kIndexedLength) std::sort(entries.begin(), entries.end() - 1);
+    } else {
+      std::move(entries.begin() + position + 1, entries.end(), entries.begin() + position);
+    }
     lists_.PopBack(lower);
   }
 
-  /// As PooledLists; IndexLongLists() must follow the last Append().
+  /// As PooledLists, entries ascending; IndexLongLists() must follow the last Append().
   void Layout(absl::Span<const uint32_t> lengths) { lists_.Layout(lengths); }
   void Append(Slot lower, UpperId upper) { lists_.Append(lower, upper); }
   void IndexLongLists() {

@@ -152,9 +152,11 @@ class Mesh {
   /// A live cell other than `c` of the same type with the same faces, or an invalid id.
   CellId FindTwin(CellId c) const;
 
+  /// Incident entities of the next dimension, once for each use; ascending where there are at most
+  /// kSortedIncident. Valid until the next edit.
+  static constexpr size_t kSortedIncident = IncidenceLists<EdgeId>::kIndexedLength;
   absl::Span<const EdgeId> IncidentEdges(VertexId v) const { return vertex_edges_.Of(v.slot()); }
   absl::Span<const FaceId> IncidentFaces(EdgeId e) const { return edge_faces_.Of(e.slot()); }
-  /// Valid until the next edit.
   absl::Span<const CellId> IncidentCells(FaceId f) const {
     const auto& uses = face_cells_[f.slot()];
     if (uses[1] == kOverflow) return face_overflow_.Of(uses[0].slot());

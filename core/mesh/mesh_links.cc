@@ -195,7 +195,7 @@ void Mesh::AddFaceCell(FaceId f, CellId c) {
     for (CellId use : {uses[0], uses[1], c}) face_overflow_.Add(list, use);
     uses = {CellId(list), kOverflow};
   } else if (uses[0].valid()) {
-    uses[1] = c;
+    uses = {std::min(uses[0], c), std::max(uses[0], c)};
     SetFaceOnBoundary(f, -1);
   } else {
     uses[0] = c;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <type_traits>
 #include <vector>
 
 #include "absl/types/span.h"
@@ -47,6 +48,47 @@ void ForEachStoredRow(const Mesh& mesh, Relation relation, const StoredRows& sto
   }
 }
 
+/// Ids of one kind as the slots that they are.
+template <EntityKind K>
+absl::Span<const Slot> AsSlots(absl::Span<const Id<K>> ids) {
+  static_assert(sizeof(Id<K>) == sizeof(Slot) && std::is_standard_layout_v<Id<K>>);
+  return absl::MakeConstSpan(reinterpret_cast<const Slot*>(ids.data()), ids.size());
+}
+
+/// Rows that stand in the mesh as they are to be told; false when the relation has none such.
+template <typename Fn>
+bool ForEachOwnRow(const Mesh& mesh, Relation relation, absl::Span<const Slot> slots, RowBlock& block,
+                   Fn& fn) {
+  const auto walk = [&](auto row_of) {
+    for (Slot slot : slots) {
+      const absl::Span<const Slot> row = AsSlots(row_of(slot));
+      if (row.size() <= Mesh::kSortedIncident) {
+        fn(slot, row);
+      } else {
+        block.Gather(mesh, relation, {&slot, 1});
+        fn(slot, block.Row(0));
+      }
+    }
+    return true;
+  };
+  if (relation == Relation{EntityKind::kCell, EntityKind::kVertex})
+    return walk([&](Slot c) { return mesh.Vertices(CellId(c)); });
+  if (relation == Relation{EntityKind::kFace, EntityKind::kVertex})
+    return walk([&](Slot f) { return mesh.Vertices(FaceId(f)); });
+  if (relation == Relation{EntityKind::kFace, EntityKind::kEdge})
+    return walk([&](Slot f) { return mesh.Edges(FaceId(f)); });
+  if (relation == Relation{EntityKind::kEdge, EntityKind::kVertex})
+    return walk([&](Slot e) { return mesh.Vertices(EdgeId(e)); });
+  if (!mesh.IsPlain()) return false;  // entries may be repeated
+  if (relation == Relation{EntityKind::kVertex, EntityKind::kEdge})
+    return walk([&](Slot v) { return mesh.IncidentEdges(VertexId(v)); });
+  if (relation == Relation{EntityKind::kEdge, EntityKind::kFace})
+    return walk([&](Slot e) { return mesh.IncidentFaces(EdgeId(e)); });
+  if (relation == Relation{EntityKind::kFace, EntityKind::kCell})
+    return walk([&](Slot f) { return mesh.IncidentCells(FaceId(f)); });
+  return false;
+}
+
 template <typename Fn>
 void ForEachRow(const Mesh& mesh, Relation relation, absl::Span<const Slot> slots, RowBlock& block, Fn& fn) {
   if (const StoredRows* stored = mesh.stored().Find(relation)) {
@@ -57,6 +99,7 @@ void ForEachRow(const Mesh& mesh, Relation relation, absl::Span<const Slot> slot
     for (Slot slot : slots) fn(slot, cell_edges->Row(slot));
     return;
   }
+  if (ForEachOwnRow(mesh, relation, slots, block, fn)) return;
   for (size_t begin = 0; begin < slots.size(); begin += RowBlock::kMaxRows) {
     const auto part = slots.subspan(begin, RowBlock::kMaxRows);
     block.Gather(mesh, relation, part);

@@ -4,6 +4,7 @@
 #include <bit>
 #include <cstring>
 
+#include "core/mesh/cells_across.h"
 #include "core/mesh/sort_unique.h"
 
 namespace dynmesh {
@@ -83,11 +84,6 @@ class RowKernels {
 
   // ---- Appending ----
 
-  void Push(Slot slot) {
-    *block_.Room(1) = slot;
-    ++block_.size_;
-  }
-
   template <typename Ids>
   void PushAll(const Ids& ids) {
     Slot* out = block_.Room(ids.size());
@@ -120,6 +116,11 @@ class RowKernels {
   /// The same, without `self`.
   void CanonicalizeWithout(size_t begin, Slot self) {
     block_.size_ = begin + SortUnique(block_.ids_.get() + begin, block_.size_ - begin, self);
+  }
+
+  /// The same where `self` stands just `times` times.
+  void CanonicalizeWithout(size_t begin, Slot self, size_t times) {
+    block_.size_ = begin + SortUniqueWithout(block_.ids_.get() + begin, block_.size_ - begin, self, times);
   }
 
   // ---- Vertices ----
@@ -246,7 +247,7 @@ class RowKernels {
         return ForEach(slots, [&](Slot e) {
           const size_t begin = block_.size_;
           for (VertexId v : mesh_.edge_vertices_[e]) PushList(mesh_.IncidentEdges(v));
-          CanonicalizeWithout(begin, e);
+          plain_ ? CanonicalizeWithout(begin, e, 2) : CanonicalizeWithout(begin, e);
         });
       case EntityKind::kFace:
         return ForEach(slots, [&](Slot e) {
@@ -278,8 +279,9 @@ class RowKernels {
       case EntityKind::kFace:
         return ForEach(slots, [&](Slot f) {
           const size_t begin = block_.size_;
-          for (EdgeId e : mesh_.Edges(FaceId(f))) PushList(mesh_.IncidentFaces(e));
-          CanonicalizeWithout(begin, f);
+          const auto edges = mesh_.Edges(FaceId(f));
+          for (EdgeId e : edges) PushList(mesh_.IncidentFaces(e));
+          plain_ ? CanonicalizeWithout(begin, f, edges.size()) : CanonicalizeWithout(begin, f);
         });
       case EntityKind::kCell:
         return ForEach(slots, [&](Slot f) {
@@ -299,9 +301,9 @@ class RowKernels {
       case EntityKind::kEdge:
         return CellEdges(slots);
       case EntityKind::kFace:
-        return ForEach(slots, [&](Slot c) {
-          for (OrientedFace oriented : mesh_.Faces(CellId(c))) Push(oriented.face().slot());
-        });
+        return mesh_.cell_face_stride_ == 4   ? CellFaces<4>(slots)
+               : mesh_.cell_face_stride_ == 5 ? CellFaces<5>(slots)
+                                              : CellFaces<6>(slots);
       case EntityKind::kCell:
         return ForEach(slots, [&](Slot c) {
           if (!plain_ || mesh_.Type(CellId(c)) != ElementType::kTetrahedron || !TetTets(c))
@@ -310,26 +312,28 @@ class RowKernels {
     }
   }
 
+  /// `kStride`: as many faces as any cell has. Those that a cell has not are overwritten.
+  template <size_t kStride>
+  void CellFaces(absl::Span<const Slot> slots) {
+    Slot* out = block_.Room(slots.size() * kStride);
+    Slot* const begin = out;
+    for (size_t i = 0; i < slots.size(); ++i) {
+      const auto faces = mesh_.Faces(CellId(slots[i]));
+      for (size_t k = 0; k < kStride; ++k) out[k] = faces.data()[k].face().slot();
+      out += faces.size();
+      block_.offsets_[i + 1] = out - begin;
+    }
+    block_.size_ = out - begin;
+  }
+
   /// The row of a tetrahedron whose faces have at most two cells each, in registers; false for others.
   bool TetTets(Slot c) {
     const OrientedFace* faces = &mesh_.cell_faces_[size_t{c} * mesh_.cell_face_stride_];
-    Slot row[4];
-    bool crowded = false;
-    Slot size = 0;
-    for (int i = 0; i < 4; ++i) {
-      const auto& uses = mesh_.face_cells_[faces[i].face().slot()];
-      const Slot first = uses[0].slot(), second = uses[1].slot();
-      crowded |= second == Mesh::kOverflow.slot();
-      row[i] = second == kNoSlot ? kNoSlot : first ^ second ^ c;
-      size += second != kNoSlot;
-    }
-    internal::SortFour(row);
-    bool repeats = false;
-    for (int i = 0; i < 3; ++i) repeats |= (row[i] == row[i + 1]) & (row[i] != kNoSlot);
-    if (crowded || repeats) return false;
-    std::memcpy(block_.Room(4), row, sizeof(row));
-    block_.size_ += size;
-    return true;
+    const std::array<CellId, 2>* uses[4];
+    for (int i = 0; i < 4; ++i) uses[i] = &mesh_.face_cells_[faces[i].face().slot()];
+    const int size = CellsAcross(c, uses, Mesh::kOverflow, block_.Room(4));
+    block_.size_ += std::max(size, 0);
+    return size >= 0;
   }
 
   void CellCells(CellId c) {

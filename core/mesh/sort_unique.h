@@ -49,6 +49,22 @@ inline void RankSort(const Slot* values, size_t count, Slot* sorted) {
   for (size_t i = 0; i < count; ++i) sorted[ranks[i]] = values[i];
 }
 
+#ifdef __x86_64__
+/// Whether this machine has registers of eight values.
+inline const bool kHasAvx2 = __builtin_cpu_supports("avx2");
+
+/// RankSort for a machine that has.
+void RankSortWide(const Slot* values, size_t count, Slot* sorted);
+#endif
+
+/// RankSort in the widest registers that there are.
+inline void RankSortBest(const Slot* values, size_t count, Slot* sorted) {
+#ifdef __x86_64__
+  if (kHasAvx2) return RankSortWide(values, count, sorted);
+#endif
+  RankSort(values, count, sorted);
+}
+
 /// Whether each value is smaller than the next. REQUIRES: count >= 2.
 inline bool IsAscending(const Slot* values, size_t count) {
   size_t i = 1;
@@ -60,6 +76,16 @@ inline void Exchange(Slot& a, Slot& b) {
   const Slot low = std::min(a, b), high = std::max(a, b);
   a = low;
   b = high;
+}
+
+/// Copies what is neither kNoSlot nor `self`; returns how many that are.
+inline size_t CopyPresent(const Slot* sorted, size_t count, Slot* values, Slot self) {
+  size_t kept = 0;
+  for (size_t i = 0; i < count; ++i) {
+    values[kept] = sorted[i];
+    kept += sorted[i] != kNoSlot && sorted[i] != self;
+  }
+  return kept;
 }
 
 inline void SortFour(Slot* v) {
@@ -79,7 +105,7 @@ inline void SortDistinct(Slot* values, size_t count) {
   if (count == 2) return std::swap(values[0], values[1]);
   if (count > internal::kRankSorted) return std::sort(values, values + count);
   Slot sorted[internal::kRankSorted];
-  internal::RankSort(values, count, sorted);
+  internal::RankSortBest(values, count, sorted);
   for (size_t at = 0; at < count; at += 4) internal::Store(internal::Load(sorted + at), values + at);
 }
 
@@ -93,18 +119,33 @@ inline size_t SortUnique(Slot* values, size_t count, Slot self = kNoSlot) {
   }
   Slot sorted[internal::kRankSorted];
   if (count > 4) {
-    internal::RankSort(values, count, sorted);
+    internal::RankSortBest(values, count, sorted);
   } else {
     std::fill_n(std::copy_n(values, count, sorted), 4 - count, kNoSlot);
     internal::SortFour(sorted);
     for (int i = 3; i > 0; --i) sorted[i] = sorted[i] == sorted[i - 1] ? kNoSlot : sorted[i];
   }
-  size_t kept = 0;
-  for (size_t i = 0; i < count; ++i) {
-    values[kept] = sorted[i];
-    kept += sorted[i] != kNoSlot && sorted[i] != self;
+  return internal::CopyPresent(sorted, count, values, self);
+}
+
+/// SortUnique where `self` stands just `times` times. Quicker where no other value is repeated.
+inline size_t SortUniqueWithout(Slot* values, size_t count, Slot self, size_t times) {
+  if (count > internal::kRankSorted || count <= 4) return SortUnique(values, count, self);
+  // All of them get one place, the last that is taken: the others stand before it without a gap.
+  constexpr Slot kLast = kNoSlot >> 1;
+  for (size_t i = 0; i < count; ++i) values[i] = values[i] == self ? kLast : values[i];
+  Slot sorted[internal::kRankSorted + 4];
+  internal::RankSortBest(values, count, sorted);
+  const size_t left = count - times;
+  std::fill_n(sorted + left, 4, 0);
+  internal::Lanes gaps = {0, 0, 0, 0};
+  for (size_t at = 0; at < left; at += 4) {
+    const internal::Lanes four = internal::Load(sorted + at);
+    internal::Store(four, values + at);
+    gaps |= four;  // only kNoSlot is negative
   }
-  return kept;
+  const bool repeats = (gaps[0] | gaps[1] | gaps[2] | gaps[3]) < 0;
+  return repeats ? internal::CopyPresent(sorted, left, values, kNoSlot) : left;
 }
 
 }  // namespace dynmesh

@@ -185,6 +185,9 @@ class MeshValidator {
     ForEachLive<LowerId>(lower, [&](LowerId id) {
       listed.clear();
       for (auto user : list_of(id)) listed.push_back(user.slot());
+      if (listed.size() <= Mesh::kSortedIncident && !std::is_sorted(listed.begin(), listed.end())) {
+        Report(EntityKindName(lower), " ", id.slot(), " lists its users in no order");
+      }
       std::sort(listed.begin(), listed.end());
       const auto expected = uses.Row(id.slot());
       if (!std::equal(listed.begin(), listed.end(), expected.begin(), expected.end())) {

@@ -170,6 +170,10 @@ TEST_F(IncidenceListsTest, BehavesLikeMultisets) {
       expected.erase(it);
     }
     ASSERT_EQ(lists_.Length(lower), expected.size());
+    if (expected.size() <= IncidenceLists<EdgeId>::kIndexedLength) {
+      const auto entries = lists_.Of(lower);
+      ASSERT_TRUE(std::is_sorted(entries.begin(), entries.end())) << i;
+    }
     if (i % 97 == 0) {
       ASSERT_EQ(Sorted(lower), std::vector<Slot>(expected.begin(), expected.end()));
     }

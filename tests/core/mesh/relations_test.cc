@@ -5,8 +5,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <random>
+#include <set>
 
+#include "core/mesh/cells_across.h"
 #include "core/mesh/sort_unique.h"
 #include "core/mesh/validate.h"
 #include "tests/support/meshes.h"
@@ -19,6 +22,73 @@ using ::testing::IsEmpty;
 
 constexpr Relation kVertexCells = {EntityKind::kVertex, EntityKind::kCell};
 constexpr Relation kCellCells = {EntityKind::kCell, EntityKind::kCell};
+
+TEST(SortUniqueTest, DropsWhatStandsSoManyTimesAndAnyRepeats) {
+  std::mt19937 rng(9);
+  constexpr Slot kSelf = 500;
+  for (size_t others = 0; others < 80; ++others) {
+    for (size_t times : {1, 2, 3, 4}) {
+      for (Slot range : {7u, 1000u, 0x7fffffffu}) {
+        std::vector<Slot> values(times, kSelf);
+        std::set<Slot> expected;
+        while (values.size() < times + others) {
+          const Slot value = rng() % range;
+          if (value == kSelf) continue;
+          values.push_back(value);
+          expected.insert(value);
+        }
+        std::shuffle(values.begin(), values.end(), rng);
+        const size_t count = values.size();
+        values.resize(count + 8);
+        values.resize(SortUniqueWithout(values.data(), count, kSelf, times));
+        EXPECT_EQ(values, std::vector<Slot>(expected.begin(), expected.end())) << others << " " << times;
+      }
+    }
+  }
+}
+
+TEST(SortUniqueTest, BothWidthsOfRegistersGiveTheSame) {
+#ifdef __x86_64__
+  if (!internal::kHasAvx2) GTEST_SKIP() << "this machine has but one";
+  std::mt19937 rng(4);
+  for (size_t count = 1; count <= internal::kRankSorted; ++count) {
+    std::vector<Slot> values(count + 16);
+    for (Slot& value : values) value = rng() % (2 * count);
+    Slot narrow[internal::kRankSorted], wide[internal::kRankSorted];
+    internal::RankSort(values.data(), count, narrow);
+    internal::RankSortWide(values.data(), count, wide);
+    EXPECT_TRUE(std::equal(narrow, narrow + count, wide)) << count;
+  }
+#endif
+}
+
+TEST(CellsAcrossTest, SortsEveryOrderOfEveryNumber) {
+  constexpr Slot kCell = 0x7ffffff0;
+  constexpr CellId kOverflow(kNoSlot - 1);
+  std::array<Slot, 4> others = {3, 17, 0x7ffffffd, 0x7ffffffe};
+  do {
+    for (unsigned present = 0; present < 16; ++present) {
+      std::array<std::array<CellId, 2>, 4> uses;
+      std::vector<Slot> expected;
+      for (int i = 0; i < 4; ++i) {
+        uses[i] = {CellId(kCell), CellId()};
+        if ((present >> i & 1) == 0) continue;
+        uses[i] = {CellId(std::min(kCell, others[i])), CellId(std::max(kCell, others[i]))};
+        expected.push_back(others[i]);
+      }
+      std::sort(expected.begin(), expected.end());
+      const std::array<CellId, 2>* pointers[] = {&uses[0], &uses[1], &uses[2], &uses[3]};
+      Slot row[4];
+      const int size = CellsAcross(kCell, pointers, kOverflow, row);
+      ASSERT_EQ(size, static_cast<int>(expected.size()));
+      EXPECT_TRUE(std::equal(expected.begin(), expected.end(), row));
+      uses[1][1] = kOverflow;
+      EXPECT_LT(CellsAcross(kCell, pointers, kOverflow, row), 0);
+      uses[1] = uses[0];
+      EXPECT_EQ(CellsAcross(kCell, pointers, kOverflow, row) < 0, (present & 1) != 0);
+    }
+  } while (std::next_permutation(others.begin(), others.end()));
+}
 
 TEST(SortUniqueTest, EqualsSortAndUniqueAtEveryLength) {
   std::mt19937 rng(1);

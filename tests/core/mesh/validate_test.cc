@@ -13,7 +13,11 @@ class MeshTestPeer {
   static void ListNot(Mesh& mesh) { mesh.edge_faces_.Remove(2, mesh.edge_faces_.Of(2)[0]); }
   static void ListAnother(Mesh& mesh) {
     ListTwice(mesh);
-    mesh.vertex_edges_.Remove(1, mesh.vertex_edges_.Of(1)[1]);
+    mesh.vertex_edges_.Remove(1, mesh.vertex_edges_.Of(1).back());
+  }
+  static void ListInNoOrder(Mesh& mesh) {
+    const auto entries = mesh.vertex_edges_.Of(1);
+    std::swap(const_cast<EdgeId&>(entries[0]), const_cast<EdgeId&>(entries[1]));
   }
   /// Of two equal triangles.
   static void MakeBothPrimary(Mesh& mesh) { mesh.flags_[2][1] &= ~Mesh::kDuplicateFlag; }
@@ -55,6 +59,8 @@ TEST(ValidateTest, NamesTheUserThatAListHasTooOftenOrTooRarely) {
   EXPECT_THAT(DamagedBy(MeshTestPeer::ListNot, OneTet()), Contains(HasSubstr("too rarely")));
   const auto swapped = DamagedBy(MeshTestPeer::ListAnother, OneTet());
   EXPECT_THAT(swapped, UnorderedElementsAre("vertex 1 lists its user 0 too often", HasSubstr("too rarely")));
+  EXPECT_THAT(DamagedBy(MeshTestPeer::ListInNoOrder, OneTet()),
+              UnorderedElementsAre("vertex 1 lists its users in no order"));
   EXPECT_THAT(DamagedBy(MeshTestPeer::SwapCode, OneTet()), Contains(HasSubstr("wrong orientation code")));
 }
 
