@@ -9,6 +9,7 @@
 #include "absl/base/thread_annotations.h"
 #include "absl/time/time.h"
 #include "absl/types/optional.h"
+#include "core/mesh/box.h"
 #include "core/mesh/estimate.h"
 #include "core/mesh/mesh.h"
 #include "server/session/mutex.h"
@@ -17,15 +18,6 @@ namespace dynmesh {
 
 /// A number for each EntityKind.
 using KindCounts = std::array<uint64_t, kNumEntityKinds>;
-
-/// Smallest and largest coordinates.
-struct Box {
-  Point low;
-  Point high;
-};
-
-/// The box round the live vertices; nullopt without any. Cost: vertices.
-absl::optional<Box> BoundsOf(const Mesh& mesh);
 
 /// Settings of a session, fixed when it is created.
 struct SessionSettings {
