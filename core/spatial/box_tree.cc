@@ -5,6 +5,7 @@
 #include <boost/geometry/geometries/point.hpp>
 #include <boost/geometry/index/rtree.hpp>
 #include <boost/geometry/strategies/cartesian/distance_pythagoras_point_box.hpp>
+#include <boost/iterator/transform_iterator.hpp>
 #include <utility>
 
 namespace dynmesh {
@@ -31,6 +32,10 @@ struct Value {
     return {{{low.get<0>(), low.get<1>(), low.get<2>()}, {high.get<0>(), high.get<1>(), high.get<2>()}},
             slot};
   }
+};
+
+struct ToValue {
+  Value operator()(const BoxTree::Entry& entry) const { return Value(entry); }
 };
 
 struct BoxOf {
@@ -130,10 +135,8 @@ BoxTree::~BoxTree() = default;
 
 void BoxTree::Build(const std::vector<Entry>& entries) {
   impl_ = std::make_unique<Impl>();  // frees the old one before the new one takes memory
-  std::vector<Value> values;
-  values.reserve(entries.size());
-  for (const Entry& entry : entries) values.emplace_back(entry);
-  impl_ = std::make_unique<Impl>(values.begin(), values.end());
+  impl_ = std::make_unique<Impl>(boost::make_transform_iterator(entries.begin(), ToValue()),
+                                 boost::make_transform_iterator(entries.end(), ToValue()));
 }
 
 void BoxTree::Insert(const Entry& entry) { impl_->tree.insert(Value(entry)); }

@@ -42,8 +42,9 @@ absl::optional<double> RayShear::Hit(const std::array<Point, 3>& triangle) const
   if ((u < 0 || v < 0 || w < 0) && (u > 0 || v > 0 || w > 0)) return absl::nullopt;
   const double sum = u + v + w;
   if (sum == 0) return absl::nullopt;
-  const double t = u / sum * depths[0] + v / sum * depths[1] + w / sum * depths[2];  // in reach of tiny ones
-  if (!(t >= 0)) return absl::nullopt;                                               // NaN too
+  // Divided before multiplied, or else products of small numbers vanish.
+  const double t = depths[0] + v / sum * (depths[1] - depths[0]) + w / sum * (depths[2] - depths[0]);
+  if (!(t >= 0)) return absl::nullopt;  // NaN too
   return t;
 }
 

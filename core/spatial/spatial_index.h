@@ -65,7 +65,7 @@ class SpatialIndex {
   absl::Status Rebuild(const Mesh& mesh, WorkMeter& meter);
   absl::Status Enter(const Mesh& mesh, const std::vector<Slot>& slots, WorkMeter& meter);
 
-  const EntityKind kind_;
+  EntityKind kind_;
   int64_t revision_ = -1;
   Frame frame_;
   absl::optional<Box> bounds_;

@@ -39,7 +39,8 @@ struct SessionInfo {
   KindCounts element_counts = {};
   int64_t euler_characteristic = 0;
   Checksum checksum;
-  uint64_t memory_bytes = 0;
+  uint64_t memory_bytes = 0;  ///< of the mesh
+  uint64_t index_bytes = 0;   ///< of its spatial indices
   uint32_t followers = 0;
   std::vector<AttributeSpec> attributes;
   absl::optional<Box> bounds;

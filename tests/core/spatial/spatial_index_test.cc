@@ -112,6 +112,25 @@ TEST(SpatialIndexTest, RolledBackEditsLeaveNoTrace) {
   ExpectSameAnswers(mesh, indices, 6, 20);
 }
 
+TEST(SpatialIndexTest, AVertexMayMoveFarBeyondWhereTheIndexBegan) {
+  Mesh mesh = TetGrid(2, 2, 2);
+  std::vector<SpatialIndex> indices = NewIndices();
+  CatchUpAll(mesh, indices);
+  for (double far : {1e6, -1e140, 1e300}) {
+    ASSERT_TRUE(mesh.MoveVertex(VertexId(26), {far, 2, 2}).ok());
+    Commit(mesh);
+    CatchUpAll(mesh, indices);
+    const Box there{{far, 0, 0}, {far, 9, 9}};
+    for (EntityKind kind : kEntityKinds) {
+      SpatialSearch search(mesh, indices[Dimension(kind)], WorkMeter::Unlimited());
+      EXPECT_EQ(*search.InBox(there), BruteInBox(mesh, kind, there));
+    }
+    SpatialSearch vertices(mesh, indices[0], WorkMeter::Unlimited());
+    EXPECT_EQ(vertices.NearestVertices({far, 3, 2}, 2)->front().vertex, VertexId(26));
+  }
+  EXPECT_GT(indices[0].num_entries(), 27u) << "it was made anew";
+}
+
 TEST(SpatialIndexTest, WhatIsInterruptedCanBeTriedAgain) {
   Mesh mesh = TetGrid(6, 6, 6);
   std::vector<SpatialIndex> indices = NewIndices();
