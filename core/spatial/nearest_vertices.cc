@@ -63,7 +63,7 @@ absl::StatusOr<std::vector<Slot>> SpatialSearch::SomeNear(const Point& point, si
     wanted = std::min(wanted, index_.num_entries());
     if (wanted == 0) return slots;
     DYNMESH_RETURN_IF_ERROR(
-        index_.tree().FindNearest({index_.frame().Nearest(point), wanted, accept}, meter_, slots));
+        index_.tree().FindNearest({index_.frame().Round(point), wanted, accept}, meter_, slots));
     std::sort(slots.begin(), slots.end());
     slots.erase(std::unique(slots.begin(), slots.end()), slots.end());
     if (slots.size() >= count || wanted == index_.num_entries()) return slots;

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <random>
+
 #include "core/mesh/error.h"
 #include "tests/core/spatial/places.h"
 #include "tests/support/count_down.h"
@@ -11,6 +13,21 @@
 
 namespace dynmesh::testing {
 namespace {
+
+TEST(FrameTest, BoxesThatMeetInOnePlaceStillMeet) {
+  std::mt19937 rng(1);
+  std::uniform_real_distribution<> uniform(-1, 1);
+  for (double scale : {1e-300, 1.0, 1e300}) {
+    const Frame frame(Box{{-scale, -scale, 0}, {scale, scale, scale}});
+    for (int i = 0; i < 1000; ++i) {
+      Box box{{uniform(rng) * scale, uniform(rng) * scale, uniform(rng)}, {9 * scale, 9 * scale, 1e308}};
+      Box touching{{-1e308, -1e308, -1e308}, box.low};
+      EXPECT_TRUE(Meet(frame.Round(box), frame.Round(touching)));
+      touching.high[i % 3] = -8 * scale;  // a float tells these apart
+      EXPECT_EQ(Meet(frame.Round(box), frame.Round(touching)), Meet(box, touching));
+    }
+  }
+}
 
 TEST(SpatialIndexTest, AnswersAreThoseOfBruteForce) {
   for (const NamedMesh& named : AllMeshes()) {
