@@ -36,17 +36,15 @@ class Slots {
       first_free_hint_ = slot;
     }
     live_.Set(slot);
-    if (slot >= born_.size()) born_.resize(slot + 1);
-    const Stamp born_before = born_[slot];
-    born_[slot] = born;
+    const Stamp born_before = born_.At(slot);
+    born_.Touch(slot, born);
     return {slot, born_before, at_end};
   }
 
   /// Allocates slots 0 to count - 1. REQUIRES: none was ever used.
   void AllocateFirst(Slot count, Stamp born) {
     live_.Fill(count);
-    born_.reserve(count + count / 16);
-    born_.assign(count, born);
+    born_.TouchFirst(count, born);
     limit_ = count;
   }
 
@@ -70,7 +68,7 @@ class Slots {
   /// Undoes the latest Allocate() that was not undone, which gave `slot` when its stamp was `born_before`.
   void UndoAllocate(Slot slot, Stamp born_before) {
     live_.Clear(slot);
-    born_[slot] = born_before;  // so that a slot beyond the limit reads as never used
+    born_.Restore(slot, born_before);  // so that a slot beyond the limit reads as never used
     if (born_before == 0 && slot + 1 == limit_) {
       --limit_;
     } else {
@@ -86,7 +84,9 @@ class Slots {
 
   bool IsLive(Slot slot) const { return live_.Test(slot); }
   /// Revision at which the present or last occupant was born; 0: the slot was never used.
-  Stamp Born(Slot slot) const { return slot < limit_ ? born_[slot] : 0; }
+  Stamp Born(Slot slot) const { return slot < limit_ ? born_.At(slot) : 0; }
+  /// Births by slot, for "what was born since"; those of slots beyond the limit are void.
+  const StampColumn& births() const { return born_; }
   const BitSet& live() const { return live_; }
   uint32_t num_live() const { return live_.size(); }
   /// One past the highest slot that was ever used.
@@ -98,10 +98,10 @@ class Slots {
     for (Slot slot : quarantine_) sound = sound && !live_.Test(slot) && !free_.Test(slot);
     return sound;
   }
-  void Reserve(size_t slots) { born_.reserve(slots); }
+  void Reserve(size_t slots) { born_.Reserve(slots); }
   size_t memory_bytes() const {
     return live_.memory_bytes() + free_.memory_bytes() + quarantine_.size() * sizeof(Slot) +
-           born_.size() * sizeof(Stamp);
+           born_.memory_bytes();
   }
 
  private:
@@ -113,7 +113,7 @@ class Slots {
   BitSet live_;
   BitSet free_;
   std::vector<Slot> quarantine_;
-  std::vector<Stamp> born_;
+  StampColumn born_;
   Slot limit_ = 0;
   Slot first_free_hint_ = 0;  ///< no free slot lies below
 };

@@ -1,6 +1,7 @@
 #ifndef DYNMESH_SERVER_RPC_CHUNK_STREAM_H_
 #define DYNMESH_SERVER_RPC_CHUNK_STREAM_H_
 
+#include <algorithm>
 #include <string>
 #include <utility>
 
@@ -17,6 +18,15 @@
 #include "server/session/session_errors.h"
 
 namespace dynmesh {
+
+/// Where the next piece of `size` items begins; the first piece may be empty, so that a revision arrives.
+template <typename Container>
+bool TakePiece(const Container& items, size_t size, size_t& next, std::pair<size_t, size_t>& piece) {
+  if (next > 0 && next >= items.size()) return false;
+  piece = {next, std::min(size, items.size() - next)};
+  next = std::max<size_t>(next + piece.second, 1);
+  return true;
+}
 
 /// Base of the RPCs that answer one request about a session by chunks of one answer, which is gathered first.
 ///

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "server/rpc/convert.h"
+#include "server/rpc/convert_spatial.h"
 #include "server/session/session_errors.h"
 
 namespace dynmesh {
@@ -10,6 +11,10 @@ namespace dynmesh {
 absl::StatusOr<Selection> ToSelection(const v1::Selection& message, int64_t as_of_revision) {
   Selection selection;
   selection.as_of_revision = as_of_revision;
+  selection.boundary_only = message.boundary_only();
+  if (message.has_box()) {
+    DYNMESH_ASSIGN_OR_RETURN(selection.box, ToBox(message.box(), "selection.box"));
+  }
   if (message.has_ids()) {
     DYNMESH_ASSIGN_OR_RETURN(selection.which, ToArray<Slot>(message.ids(), "selection.ids"));
     return selection;
@@ -29,11 +34,11 @@ uint64_t CountSelected(const v1::Selection& message, uint64_t num_live) {
   return std::min<uint64_t>(num_live, range.end() - std::min(range.begin(), range.end()));
 }
 
-absl::StatusOr<Relation> ToRelation(const v1::GetNeighborsRequest& request) {
+absl::StatusOr<Neighborhood> ToNeighborhood(const v1::GetNeighborsRequest& request) {
   Relation relation;
   DYNMESH_ASSIGN_OR_RETURN(relation.from, ToEntityKind(request.from(), "from"));
   DYNMESH_ASSIGN_OR_RETURN(relation.to, ToEntityKind(request.to(), "to"));
-  return relation;
+  return Neighborhood(relation, request.rings() == 0 ? 1 : request.rings());
 }
 
 void FromNeighborsChunk(const NeighborsChunk& chunk, v1::GetNeighborsResponse* response) {

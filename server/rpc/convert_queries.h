@@ -7,14 +7,14 @@
 
 namespace dynmesh {
 
-/// Errors: INVALID_ARGUMENT BAD_ARGUMENT, BAD_ARRAY_LENGTH.
+/// Errors: INVALID_ARGUMENT BAD_ARGUMENT, BAD_ARRAY_LENGTH, NON_FINITE_VALUE.
 absl::StatusOr<Selection> ToSelection(const v1::Selection& message, int64_t as_of_revision);
 
 /// How many entities `message` may select when `num_live` are live.
 uint64_t CountSelected(const v1::Selection& message, uint64_t num_live);
 
 /// Errors: INVALID_ARGUMENT BAD_ENTITY_KIND.
-absl::StatusOr<Relation> ToRelation(const v1::GetNeighborsRequest& request);
+absl::StatusOr<Neighborhood> ToNeighborhood(const v1::GetNeighborsRequest& request);
 
 void FromNeighborsChunk(const NeighborsChunk& chunk, v1::GetNeighborsResponse* response);
 void FromEntitiesChunk(const EntitiesChunk& chunk, v1::GetEntitiesResponse* response);

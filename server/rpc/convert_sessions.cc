@@ -131,6 +131,7 @@ v1::Session FromSessionInfo(const SessionInfo& info) {
   message.set_euler_characteristic(info.euler_characteristic);
   *message.mutable_checksum() = FromChecksum(info.checksum);
   message.set_memory_bytes(info.memory_bytes);
+  message.set_index_bytes(info.index_bytes);
   message.set_followers(info.followers);
   for (const AttributeSpec& spec : info.attributes) *message.add_attributes() = FromAttributeSpec(spec);
   if (info.bounds.has_value()) {

@@ -8,6 +8,7 @@
 #include "server/rpc/chunk_stream.h"
 #include "server/rpc/convert.h"
 #include "server/rpc/convert_queries.h"
+#include "server/rpc/spatial_reactors.h"
 #include "server/rpc/unary.h"
 #include "server/session/queries.h"
 
@@ -30,15 +31,21 @@ class GetNeighborsReactor final : public ChunkStreamReactor<v1::GetNeighborsResp
 
  private:
   bool IsHeavy(const Session& session) const override {
-    return IsHeavySelection(request_.selection(), request_.from(), session);
+    return IsHeavySelection(request_.selection(), request_.from(), session) || MayReachMany(session);
+  }
+
+  /// Rings of rings may be everything.
+  bool MayReachMany(const Session& session) const {
+    const absl::StatusOr<EntityKind> kind = ToEntityKind(request_.from(), "from");
+    return kind.ok() && request_.rings() > 1 && session.num_live(*kind) > kManyRows;
   }
 
   absl::Status Gather(const Session& session, const QueryTerms& terms, AccessGrant&) override {
     DYNMESH_RETURN_IF_ERROR(CheckMessageSize(request_, services_.limits()));
-    DYNMESH_ASSIGN_OR_RETURN(const Relation relation, ToRelation(request_));
+    DYNMESH_ASSIGN_OR_RETURN(const Neighborhood neighborhood, ToNeighborhood(request_));
     DYNMESH_ASSIGN_OR_RETURN(const Selection selection,
                              ToSelection(request_.selection(), request_.as_of_revision()));
-    DYNMESH_ASSIGN_OR_RETURN(answer_, QueryNeighbors(session, relation, selection, terms));
+    DYNMESH_ASSIGN_OR_RETURN(answer_, QueryNeighbors(session, neighborhood, selection, terms));
     return absl::OkStatus();
   }
 
@@ -86,15 +93,6 @@ class GetEntitiesReactor final : public ChunkStreamReactor<v1::GetEntitiesRespon
   size_t next_ = 0;
 };
 
-/// Where the next piece of `size` items begins; the first piece may be empty, so that a revision arrives.
-template <typename Container>
-bool TakePiece(const Container& items, size_t size, size_t& next, std::pair<size_t, size_t>& piece) {
-  if (next > 0 && next >= items.size()) return false;
-  piece = {next, std::min(size, items.size() - next)};
-  next = std::max<size_t>(next + piece.second, 1);
-  return true;
-}
-
 class GetBoundaryReactor final : public ChunkStreamReactor<v1::GetBoundaryResponse> {
  public:
   GetBoundaryReactor(const ServiceContext& services, grpc::CallbackServerContext* context,
@@ -119,7 +117,7 @@ class GetBoundaryReactor final : public ChunkStreamReactor<v1::GetBoundaryRespon
   }
 
   const v1::GetBoundaryRequest request_;
-  BoundaryAnswer answer_;
+  IdsAnswer answer_;
   size_t next_ = 0;
 };
 
@@ -184,6 +182,26 @@ class QueriesService final : public v1::QueryService::CallbackService {
       grpc::CallbackServerContext* context, const v1::GetBoundarySurfaceRequest* request) override {
     return (new GetBoundarySurfaceReactor(services_, context, request))
         ->Start(request->session(), request->ByteSizeLong());
+  }
+
+  grpc::ServerWriteReactor<v1::FindInBoxResponse>* FindInBox(grpc::CallbackServerContext* context,
+                                                             const v1::FindInBoxRequest* request) override {
+    return StartFindInBox(services_, context, *request);
+  }
+
+  grpc::ServerWriteReactor<v1::FindNearestVerticesResponse>* FindNearestVertices(
+      grpc::CallbackServerContext* context, const v1::FindNearestVerticesRequest* request) override {
+    return StartFindNearestVertices(services_, context, *request);
+  }
+
+  grpc::ServerWriteReactor<v1::LocatePointsResponse>* LocatePoints(
+      grpc::CallbackServerContext* context, const v1::LocatePointsRequest* request) override {
+    return StartLocatePoints(services_, context, *request);
+  }
+
+  grpc::ServerWriteReactor<v1::CastRaysResponse>* CastRays(grpc::CallbackServerContext* context,
+                                                           const v1::CastRaysRequest* request) override {
+    return StartCastRays(services_, context, *request);
   }
 
  private:

@@ -37,10 +37,12 @@ class Exporter {
 
   /// Calls fn for each live slot of a kind.
   absl::Status ForEachLive(EntityKind kind, absl::FunctionRef<absl::Status(Slot)> fn) {
-    return ForEachSelected(mesh_, kind, {}, [&](Slot slot) -> absl::Status {
+    const BitSet& live = mesh_.slots(kind).live();
+    for (Slot slot = live.Next(0); slot != kNoSlot; slot = live.Next(slot + 1)) {
       DYNMESH_RETURN_IF_ERROR(budget_.ChargeSteps(1));
-      return fn(slot);
-    });
+      DYNMESH_RETURN_IF_ERROR(fn(slot));
+    }
+    return absl::OkStatus();
   }
 
   absl::Status Vertices() {

@@ -3,7 +3,9 @@
 #include <utility>
 
 #include "core/mesh/error.h"
+#include "core/mesh/rings.h"
 #include "server/session/row_walk.h"
+#include "server/session/session_errors.h"
 
 namespace dynmesh {
 namespace {
@@ -11,13 +13,16 @@ namespace {
 /// Cuts rows of neighbours into chunks.
 class NeighborsBuilder {
  public:
-  NeighborsBuilder(const Mesh& mesh, Relation relation, QueryBudget& budget)
-      : walk_(mesh, relation, budget), budget_(budget) {
+  NeighborsBuilder(const Mesh& mesh, const Neighborhood& neighborhood, QueryBudget& budget)
+      : rings_(neighborhood.rings),
+        walk_(mesh, neighborhood.relation, budget),
+        ring_walk_(mesh, neighborhood.relation.from, budget),
+        budget_(budget) {
     chunks_.emplace_back();
   }
 
   absl::Status AddRow(Slot slot) {
-    DYNMESH_RETURN_IF_ERROR(walk_.Walk(slot, row_));
+    DYNMESH_RETURN_IF_ERROR(rings_ == 1 ? walk_.Walk(slot, row_) : ring_walk_.Walk(slot, rings_, row_));
     DYNMESH_RETURN_IF_ERROR(budget_.ChargeBytes(row_.size() * sizeof(Slot) + kRowBytes));
     size_t cut = 0;
     if (row_.size() > kPieceIds) {
@@ -59,7 +64,9 @@ class NeighborsBuilder {
     return cut;
   }
 
+  const uint32_t rings_;
   RowWalk walk_;
+  RingWalk ring_walk_;
   QueryBudget& budget_;
   std::vector<Slot> row_;
   size_t first_offset_ = 0;  ///< neighbours of the last chunk's first row that earlier chunks hold
@@ -123,53 +130,60 @@ class EntitiesBuilder {
   std::vector<EntitiesChunk> chunks_;
 };
 
-absl::StatusOr<NeighborsAnswer> GatherNeighbors(const Mesh& mesh, Relation relation,
-                                                const Selection& selection, QueryBudget budget) {
-  NeighborsBuilder builder(mesh, relation, budget);
-  DYNMESH_RETURN_IF_ERROR(
-      ForEachSelected(mesh, relation.from, selection, [&](Slot slot) { return builder.AddRow(slot); }));
-  return NeighborsAnswer{mesh.revision(), std::move(builder).Take()};
+absl::StatusOr<NeighborsAnswer> GatherNeighbors(const SelectionScope& scope, const Neighborhood& neighborhood,
+                                                const Selection& selection, QueryBudget& budget) {
+  NeighborsBuilder builder(scope.mesh, neighborhood, budget);
+  DYNMESH_RETURN_IF_ERROR(ForEachSelected(scope, neighborhood.relation.from, selection,
+                                          [&](Slot slot) { return builder.AddRow(slot); }));
+  return NeighborsAnswer{scope.mesh.revision(), std::move(builder).Take()};
 }
 
-absl::StatusOr<EntitiesAnswer> GatherEntities(const Mesh& mesh, EntityKind kind, const Selection& selection,
-                                              QueryBudget budget) {
-  EntitiesBuilder builder(mesh, kind, budget);
+absl::StatusOr<EntitiesAnswer> GatherEntities(const SelectionScope& scope, EntityKind kind,
+                                              const Selection& selection, QueryBudget& budget) {
+  EntitiesBuilder builder(scope.mesh, kind, budget);
   DYNMESH_RETURN_IF_ERROR(
-      ForEachSelected(mesh, kind, selection, [&](Slot slot) { return builder.Add(slot); }));
-  return EntitiesAnswer{mesh.revision(), std::move(builder).Take()};
+      ForEachSelected(scope, kind, selection, [&](Slot slot) { return builder.Add(slot); }));
+  return EntitiesAnswer{scope.mesh.revision(), std::move(builder).Take()};
 }
 
-absl::StatusOr<BoundaryAnswer> GatherBoundary(const Mesh& mesh, EntityKind kind, QueryBudget budget) {
+absl::Status CheckRings(const Neighborhood& neighborhood) {
+  const auto& [relation, rings] = neighborhood;
+  if (rings < 1 || rings > kMaxRings) return BadField("rings", "rings is outside 1-1000");
+  if (rings == 1 || relation.from == relation.to) return absl::OkStatus();
+  return BadField("rings", "rings are of adjacent entities: from and to must be the same kind");
+}
+
+absl::StatusOr<IdsAnswer> GatherBoundary(const Mesh& mesh, EntityKind kind, QueryBudget budget) {
   const BitSet& boundary = mesh.Boundary(kind);
   DYNMESH_RETURN_IF_ERROR(budget.ChargeSteps(boundary.size()));
   DYNMESH_RETURN_IF_ERROR(budget.ChargeBytes(boundary.size() * sizeof(Slot)));
-  BoundaryAnswer answer{mesh.revision(), {}};
+  IdsAnswer answer{mesh.revision(), {}};
   boundary.ListMembers(answer.ids);
   return answer;
 }
 
 }  // namespace
 
-absl::StatusOr<NeighborsAnswer> QueryNeighbors(const Session& session, Relation relation,
+absl::StatusOr<NeighborsAnswer> QueryNeighbors(const Session& session, const Neighborhood& neighborhood,
                                                const Selection& selection, const QueryTerms& terms) {
+  DYNMESH_RETURN_IF_ERROR(CheckRings(neighborhood));
   return session.ReadAs<NeighborsAnswer>([&](const SessionView& view) {
-    return GatherNeighbors(view.mesh, relation, selection, QueryBudget(session.limits(), terms));
+    QueryBudget budget(session.limits(), terms);
+    return GatherNeighbors({view.mesh, session.spatial(), budget}, neighborhood, selection, budget);
   });
 }
 
 absl::StatusOr<EntitiesAnswer> QueryEntities(const Session& session, EntityKind kind,
                                              const Selection& selection, const QueryTerms& terms) {
   return session.ReadAs<EntitiesAnswer>([&](const SessionView& view) {
-    return GatherEntities(view.mesh, kind, selection, QueryBudget(session.limits(), terms));
+    QueryBudget budget(session.limits(), terms);
+    return GatherEntities({view.mesh, session.spatial(), budget}, kind, selection, budget);
   });
 }
 
-absl::StatusOr<BoundaryAnswer> QueryBoundary(const Session& session, EntityKind kind,
-                                             const QueryTerms& terms) {
-  if (kind == EntityKind::kCell) {
-    return InvalidArgument(reason::kBadEntityKind, "cells are never on the boundary", {{"kind", "cell"}});
-  }
-  return session.ReadAs<BoundaryAnswer>([&](const SessionView& view) {
+absl::StatusOr<IdsAnswer> QueryBoundary(const Session& session, EntityKind kind, const QueryTerms& terms) {
+  DYNMESH_RETURN_IF_ERROR(CheckHasBoundary(kind));
+  return session.ReadAs<IdsAnswer>([&](const SessionView& view) {
     return GatherBoundary(view.mesh, kind, QueryBudget(session.limits(), terms));
   });
 }

@@ -30,9 +30,19 @@ struct NeighborsAnswer {
   std::vector<NeighborsChunk> chunks;
 };
 
-/// Errors: NOT_FOUND ENTITY_REMOVED or UNKNOWN_ENTITY (metadata ids: the first that are not live);
-/// OUT_OF_RANGE REVISION_IN_FUTURE.
-absl::StatusOr<NeighborsAnswer> QueryNeighbors(const Session& session, Relation relation,
+/// A relation, and for entities of the same kind how often it is applied: what lies in at most so many steps
+/// (core/mesh/rings.h).
+struct Neighborhood {
+  Relation relation;
+  uint32_t rings = 1;
+
+  Neighborhood(Relation r, uint32_t n = 1) : relation(r), rings(n) {}  // NOLINT: a relation is one
+};
+inline constexpr uint32_t kMaxRings = 1000;
+
+/// Errors: those of ForEachSelected; INVALID_ARGUMENT BAD_ARGUMENT (rings) for other than one ring between
+/// different kinds, none, and more than kMaxRings.
+absl::StatusOr<NeighborsAnswer> QueryNeighbors(const Session& session, const Neighborhood& neighborhood,
                                                const Selection& selection, const QueryTerms& terms = {});
 
 enum EntityFlags : uint8_t { kIsElement = 1, kIsOnBoundary = 2, kIsDuplicate = 4 };
@@ -55,14 +65,15 @@ struct EntitiesAnswer {
 absl::StatusOr<EntitiesAnswer> QueryEntities(const Session& session, EntityKind kind,
                                              const Selection& selection, const QueryTerms& terms = {});
 
-struct BoundaryAnswer {
+/// Of a list of entities.
+struct IdsAnswer {
   int64_t revision = 0;
-  std::vector<Slot> ids;  ///< ascending
+  std::vector<Slot> ids;
 };
 
-/// Errors: INVALID_ARGUMENT BAD_ENTITY_KIND for cells.
-absl::StatusOr<BoundaryAnswer> QueryBoundary(const Session& session, EntityKind kind,
-                                             const QueryTerms& terms = {});
+/// Ascending. Errors: INVALID_ARGUMENT BAD_ENTITY_KIND for cells.
+absl::StatusOr<IdsAnswer> QueryBoundary(const Session& session, EntityKind kind,
+                                        const QueryTerms& terms = {});
 
 /// The boundary as triangles, not yet encoded: EncodeSurface() needs no session.
 struct SurfaceAnswer {

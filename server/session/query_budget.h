@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "absl/status/status.h"
+#include "core/mesh/work_meter.h"
 #include "server/session/budget.h"
 #include "server/session/limits.h"
 #include "server/session/stop_signal.h"
@@ -22,22 +23,22 @@ struct QueryTerms {
 /// query takes a time that is bounded whatever the mesh looks like, and never goes on for longer than
 /// kStepsPerCheck steps after nobody wants its answer any more.
 /// Thread safety: that of std::vector.
-class QueryBudget {
+class QueryBudget final : public WorkMeter {
  public:
-  static constexpr uint64_t kStepsPerCheck = 8192;
+  static constexpr uint64_t kStepsPerCheck = WorkMeter::kMaxCharge;
 
   QueryBudget(const Limits& limits, const QueryTerms& terms)
       : max_bytes_(limits.max_query_bytes), max_steps_(limits.max_query_steps), terms_(terms) {}
 
   /// Errors: RESOURCE_EXHAUSTED LIMIT_EXCEEDED (max_query_bytes, max_answer_bytes).
-  absl::Status ChargeBytes(uint64_t bytes) {
+  absl::Status ChargeBytes(uint64_t bytes) override {
     bytes_ += bytes;
     return bytes_ <= leased_ ? absl::OkStatus() : LeaseMore();
   }
 
   /// To be called before the steps are made, so `steps` should be no more than some kStepsPerCheck.
   /// Errors: RESOURCE_EXHAUSTED LIMIT_EXCEEDED (max_query_steps); those of the StopSignal.
-  absl::Status ChargeSteps(uint64_t steps) {
+  absl::Status ChargeSteps(uint64_t steps) override {
     steps_ += steps;
     return steps_ < next_check_ ? absl::OkStatus() : CheckSteps();
   }

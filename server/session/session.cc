@@ -109,6 +109,7 @@ Session::Session(const Options& options)
       create_time_(absl::Now()),
       mesh_(MeshOptions{options.settings.duplicates, ToMeshLimits(options.limits)}),
       commit_time_(create_time_),
+      spatial_(options.limits.max_session_bytes),
       followers_(options.limits.max_followers),
       deltas_(*this) {
   // Nothing to fill: this cannot fail for relations that are storable.
@@ -136,6 +137,7 @@ SessionInfo Session::Describe(const Mesh& mesh, const MeshSummary& summary, absl
   info.etag = EtagAt(info.revision);
   info.create_time = create_time_;
   info.update_time = update_time;
+  info.index_bytes = spatial_.memory_bytes();
   info.followers = followers_.size();
   return info;
 }
@@ -206,6 +208,8 @@ absl::Status Session::CheckMemory(absl::Span<const Edit> edits) {
   if (bytes > limits().max_session_bytes) {
     return LimitExceeded("max_session_bytes", limits().max_session_bytes, bytes);
   }
+  // An index can be made again; an edit that is refused cannot.
+  if (bytes + spatial_.memory_bytes() > limits().max_session_bytes) spatial_.Clear();
   items_since_check_ = 0;
   return absl::OkStatus();
 }

@@ -24,6 +24,7 @@
 #include "server/session/limits.h"
 #include "server/session/mutex.h"
 #include "server/session/session_info.h"
+#include "server/session/shared_spatial_index.h"
 #include "server/session/workers.h"
 
 namespace dynmesh {
@@ -53,6 +54,7 @@ absl::Status CheckSessionName(absl::string_view name);
 ///
 ///     Session ── AccessQueue ── calls that wait for their turn
 ///        ├────── mu_ (reader/writer) ── Mesh, commit time, answers to request ids
+///        ├────── SharedSpatialIndex ── read under the reader lock, with locks of its own
 ///        ├────── FollowerList ── Follower ── DeltaSink (an RPC stream)
 ///        └────── DeltaSource ── encoded payloads shared by followers, quantisation grids
 ///
@@ -140,6 +142,9 @@ class Session : public std::enable_shared_from_this<Session> {
   /// Errors: ABORTED ETAG_MISMATCH; NOT_FOUND SESSION_DELETED.
   absl::StatusOr<int64_t> Delete(absl::string_view etag) ABSL_LOCKS_EXCLUDED(mu_);
 
+  /// Where entities are; to be read while the session is.
+  SharedSpatialIndex& spatial() const { return spatial_; }
+
   FollowerList& followers() { return followers_; }
   DeltaSource& deltas() { return deltas_; }
 
@@ -175,6 +180,7 @@ class Session : public std::enable_shared_from_this<Session> {
   AnswerMemory<ImportOutcome> imports_ ABSL_GUARDED_BY(imports_mu_);
 
   mutable SummaryCache summary_;
+  mutable SharedSpatialIndex spatial_;
   FollowerList followers_;
   DeltaSource deltas_;
 };

@@ -46,21 +46,6 @@ MeshSummary Summarize(const Mesh& mesh) {
 
 }  // namespace
 
-absl::optional<Box> BoundsOf(const Mesh& mesh) {
-  const BitSet& live = mesh.slots(EntityKind::kVertex).live();
-  if (live.empty()) return absl::nullopt;
-  const Point& first = mesh.Position(VertexId(live.Next(0)));
-  Box box{first, first};
-  live.ForEach([&](Slot slot) {
-    const Point& position = mesh.Position(VertexId(slot));
-    for (int axis = 0; axis < 3; ++axis) {
-      box.low[axis] = std::min(box.low[axis], position[axis]);
-      box.high[axis] = std::max(box.high[axis], position[axis]);
-    }
-  });
-  return box;
-}
-
 MeshSummary SummaryCache::Of(const Mesh& mesh) {
   MutexLock lock(&mu_);
   if (revision_ != mesh.revision()) {

@@ -11,6 +11,7 @@
 #include "absl/time/time.h"
 #include "absl/types/optional.h"
 #include "absl/types/span.h"
+#include "core/mesh/box.h"
 #include "core/mesh/estimate.h"
 #include "core/mesh/mesh.h"
 #include "server/session/mutex.h"
@@ -19,15 +20,6 @@ namespace dynmesh {
 
 /// A number for each EntityKind.
 using KindCounts = std::array<uint64_t, kNumEntityKinds>;
-
-/// Smallest and largest coordinates.
-struct Box {
-  Point low;
-  Point high;
-};
-
-/// The box round the live vertices; nullopt without any. Cost: vertices.
-absl::optional<Box> BoundsOf(const Mesh& mesh);
 
 struct SessionSettings {
   DuplicatePolicy duplicates = DuplicatePolicy::kKeep;  ///< fixed when the session is created
@@ -63,7 +55,8 @@ struct SessionInfo {
   KindCounts element_counts = {};
   int64_t euler_characteristic = 0;
   Checksum checksum;
-  uint64_t memory_bytes = 0;
+  uint64_t memory_bytes = 0;  ///< of the mesh
+  uint64_t index_bytes = 0;   ///< of its spatial indices
   uint32_t followers = 0;
   std::vector<AttributeSpec> attributes;
   std::vector<StoredRelation> stored_relations;  ///< those of settings, in that order

@@ -142,9 +142,41 @@ def test_wrong_usage_is_2(run, args):
 
 
 def test_help_is_there_for_every_command(run):
-    for command in ("serve", "create", "import", "store", "export", "ls", "info", "watch", "rm"):
+    for command in ("serve", "create", "import", "store", "export", "ls", "info", "watch", "query", "rm"):
         shown = run(command, "--help")
         assert shown.returncode == 0 and "usage: dynmesh" in shown.stdout
+
+
+def test_query_asks_about_neighbours_and_places(run, mesh_file):
+    run("create", "asked", mesh_file)
+
+    def ask(*args):
+        shown, told = run("query", *args), run("query", *args, "--json")
+        assert (shown.returncode, told.returncode) == (0, 0), shown.stderr + told.stderr
+        return shown.stdout.splitlines(), json.loads(told.stdout)
+
+    lines, record = ask("neighbors", "asked", "cell", "cell")
+    assert lines == ["0: 1", "1: 0"]
+    assert record == {"revision": 1, "rows": [{"id": 0, "neighbors": [1]}, {"id": 1, "neighbors": [0]}]}
+    corner = ["0", "0", "0", "0.5", "0.5", "0.5"]
+    assert ask("neighbors", "asked", "vertex", "cell", "--box", *corner)[0] == ["0: 0"]
+    assert ask("neighbors", "asked", "vertex", "vertex", "--ids", "0", "--rings", "2", "--boundary")[0] == [
+        "0: 1 2 3 4"
+    ]
+    assert ask("box", "asked", "cell", *corner)[1]["ids"] == [0, 1]
+    lines, record = ask("nearest", "asked", "-1", "0", "0", "--count", "2")
+    assert lines[0] == "0 at distance 1" and record["distances"] == pytest.approx([1, 2**0.5])
+    assert ask("locate", "asked", "0.1", "0.1", "0.1") == (["cell 0"], {"revision": 1, "kind": "cell", "id": 0})
+    assert ask("locate", "asked", "-0.5", "9", "9")[0] == ["in no cell"]
+    assert ask("locate", "asked", "0.2", "0.2", "-0.01", "--in", "face", "--tolerance", "0.1")[1]["id"] is not None
+    hit = ask("ray", "asked", "0.2", "0.2", "-1", "0", "0", "1")
+    assert hit[1]["t"] == [1] and hit[0][0].endswith("at t = 1")
+    assert len(ask("ray", "asked", "0.2", "0.3", "-1", "0", "0", "1", "--all", "--any-face")[1]["t"]) == 3
+    assert ask("ray", "asked", "5", "5", "5", "1", "0", "0")[0] == ["nothing"]
+    refused = run("query", "box", "asked", "cell", "1", "1", "1", "0", "0", "0")
+    assert refused.returncode == 1 and refused.stderr.endswith("[BAD_ARGUMENT]\n")
+    assert run("query", "asked").returncode == 2 and run("query", "nearest", "asked", "x", "0", "0").returncode == 2
+    run("rm", "asked")
 
 
 def test_watch_prints_a_line_for_each_step(daemon, client, run):

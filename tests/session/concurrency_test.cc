@@ -90,7 +90,7 @@ TEST(ConcurrencyTest, ReadersSeeWholeRevisionsAndFollowersStayEqual) {
   });
   readers.emplace_back([&] {
     while (!stop) {
-      ASSERT_TRUE(QueryNeighbors(*session, {EntityKind::kVertex, EntityKind::kCell}, {}).ok());
+      ASSERT_TRUE(QueryNeighbors(*session, Relation{EntityKind::kVertex, EntityKind::kCell}, {}).ok());
       ASSERT_TRUE(session
                       ->Read([](const SessionView& view) {
                         EXPECT_THAT(Validate(view.mesh), ::testing::IsEmpty());

@@ -65,7 +65,7 @@ TEST(QueriesTest, All16RelationsAreThoseOfTheMesh) {
                     .ok());
     for (EntityKind from : kEntityKinds) {
       for (EntityKind to : kEntityKinds) {
-        const auto answer = QueryNeighbors(*session, {from, to}, {});
+        const auto answer = QueryNeighbors(*session, Relation{from, to}, {});
         ASSERT_TRUE(answer.ok()) << answer.status();
         EXPECT_EQ(answer->revision, 1);
         std::vector<Slot> ids;
@@ -90,7 +90,7 @@ TEST(QueriesTest, SelectionsKeepTheirOrder) {
   MustApply(*session, EditsOf(TetGrid(2, 2, 2)));
   const auto ids_of = [&](const Selection& selection) {
     std::vector<Slot> ids;
-    const auto answer = QueryNeighbors(*session, {EntityKind::kVertex, EntityKind::kCell}, selection);
+    const auto answer = QueryNeighbors(*session, Relation{EntityKind::kVertex, EntityKind::kCell}, selection);
     EXPECT_TRUE(answer.ok()) << answer.status();
     if (answer.ok()) Join(*answer, &ids);
     return ids;
@@ -105,7 +105,8 @@ TEST(QueriesTest, SelectionsKeepTheirOrder) {
 TEST(QueriesTest, AnswersWithoutRowsHaveAChunkAllTheSame) {
   Daemon daemon;
   const SessionPtr session = daemon.NewSession();
-  EXPECT_EQ(QueryNeighbors(*session, {EntityKind::kVertex, EntityKind::kCell}, {})->chunks.size(), 1u);
+  EXPECT_EQ(QueryNeighbors(*session, Relation{EntityKind::kVertex, EntityKind::kCell}, {})->chunks.size(),
+            1u);
   EXPECT_EQ(QueryEntities(*session, EntityKind::kCell, {})->chunks.size(), 1u);
   EXPECT_EQ(ExportSession(*session)->chunks.size(), 1u);
 }
@@ -144,7 +145,8 @@ TEST(QueriesTest, ARowLongerThanAChunkIsCut) {
   MustApply(*session, {vertices});
   for (Slot& slot : spokes.vertices) slot &= ~kNewVertex;
   MustApply(*session, {spokes});
-  const auto answer = QueryNeighbors(*session, {EntityKind::kVertex, EntityKind::kVertex}, Ids({1, 0, 2}));
+  const auto answer =
+      QueryNeighbors(*session, Relation{EntityKind::kVertex, EntityKind::kVertex}, Ids({1, 0, 2}));
   ASSERT_TRUE(answer.ok()) << answer.status();
   EXPECT_GT(answer->chunks.size(), 3u);
   std::vector<Slot> ids;
@@ -163,13 +165,13 @@ TEST(QueriesTest, AnswersAreLimited) {
   const SessionPtr session = daemon.NewSession();
   MustApply(*session, EditsOf(TetGrid(3, 3, 3)));
   const Refusal limited{absl::StatusCode::kResourceExhausted, reason::kLimitExceeded};
-  const auto neighbors = QueryNeighbors(*session, {EntityKind::kCell, EntityKind::kEdge}, {});
+  const auto neighbors = QueryNeighbors(*session, Relation{EntityKind::kCell, EntityKind::kEdge}, {});
   EXPECT_EQ(RefusalOf(neighbors), limited);
   EXPECT_EQ(MetadataOf(neighbors.status(), "limit"), "max_query_bytes");
   EXPECT_EQ(RefusalOf(QueryEntities(*session, EntityKind::kVertex, {})), limited);
   EXPECT_EQ(RefusalOf(ExportSession(*session)), limited);
   EXPECT_EQ(RefusalOf(QuerySurface(*session)), limited);
-  EXPECT_TRUE(QueryNeighbors(*session, {EntityKind::kCell, EntityKind::kEdge}, Range(0, 10)).ok());
+  EXPECT_TRUE(QueryNeighbors(*session, Relation{EntityKind::kCell, EntityKind::kEdge}, Range(0, 10)).ok());
 }
 
 TEST(QueriesTest, EntitiesTellWhatTheyAre) {

@@ -42,6 +42,7 @@ from .info import AttributeSpec, Counts, MeshWarning, SessionInfo
 from .kinds import ElementType, EntityKind
 from .mirror import Elements, Mirror, Update
 from .mirror_stats import MirrorStats
+from .places import Located, NearestVertices, RayHits
 from .queries import Csr, Entities, Surface
 from .session import Session
 from .snapshot import Attribute, Block, Snapshot
@@ -78,13 +79,16 @@ __all__ = [
     "InternalError",
     "InvalidArgumentError",
     "LaunchError",
+    "Located",
     "MeshWarning",
     "Mirror",
     "MirrorError",
     "MirrorStats",
+    "NearestVertices",
     "NotFoundError",
     "OutOfRangeError",
     "PermissionDeniedError",
+    "RayHits",
     "ResourceExhaustedError",
     "Session",
     "SessionInfo",

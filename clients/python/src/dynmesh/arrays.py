@@ -54,6 +54,27 @@ def as_points(values: ArrayLike, what: str = "positions") -> Points:
     return points.astype(np.float64, copy=False)
 
 
+def as_point_rows(values: ArrayLike, what: str) -> Points:
+    """`values` as float64[n, 3], where one point alone is one row."""
+    array = _as_array(values, what)
+    return as_points(array[np.newaxis] if array.shape == (3,) else array, what)
+
+
+def as_number(value: float, what: str) -> float:
+    """`value` as a float. Raises `InvalidArgumentError` for what is none."""
+    if isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool):
+        return float(value)
+    raise InvalidArgumentError(f"{what} is no number: {value!r}", reason="BAD_ARGUMENT", metadata={"field": what})
+
+
+def as_count(value: int, what: str) -> int:
+    """`value` for a uint32 field where 0 stands for a default: 1 or more. Raises `InvalidArgumentError`."""
+    number = as_int64(value, what)
+    if 1 <= number <= 0xFFFFFFFF:
+        return number
+    raise InvalidArgumentError(f"{what} is not positive: {value}", reason="BAD_ARGUMENT", metadata={"field": what})
+
+
 def as_integers(values: ArrayLike) -> NDArray[np.int64] | None:
     """`values` as int64 of any shape; None for what are no such integers."""
     array = _as_array(values, "ids")

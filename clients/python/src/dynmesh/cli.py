@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from .cli_query import add_questions
 from .cli_watch import watch
 from .client import DEFAULT_TARGET, DEFAULT_TIMEOUT_S, Client, connect
 from .daemon import find_daemon
@@ -60,6 +61,7 @@ def make_parser() -> argparse.ArgumentParser:
     _add_serve(commands)
     _add_writing(commands)
     _add_reading(commands)
+    _add_query(commands)
     return parser
 
 
@@ -156,6 +158,14 @@ def _add_reading(commands: Any) -> None:
     )
 
 
+def _add_query(commands: Any) -> None:
+    help_text = "Ask about neighbours and places."
+    questions = commands.add_parser("query", help=help_text, description=help_text).add_subparsers(
+        metavar="QUESTION", required=True
+    )
+    add_questions(lambda name, text: _command(questions, name, _query, text))
+
+
 # ---- Commands ----
 
 
@@ -228,6 +238,12 @@ def _info(args: argparse.Namespace) -> None:
 def _watch(args: argparse.Namespace) -> int:
     with _client(args) as client:
         return watch(client.session(args.name), args)
+
+
+def _query(args: argparse.Namespace) -> None:
+    with _client(args) as client:
+        record, text = args.ask(client.session(args.name), args)
+    _print(args, record, text)
 
 
 def _rm(args: argparse.Namespace) -> int | None:
@@ -308,7 +324,10 @@ def _describe(info: SessionInfo) -> str:
     ):
         lines.append(f"{title:10} " + " ".join(f"{count:12}" for count in counts))
     lines += ["", f"checksum   {info.checksum}", f"Euler      {info.euler_characteristic}"]
-    lines += [f"memory     {info.memory_bytes / 2**20:.1f} MiB", f"followers  {info.followers}"]
+    memory = f"memory     {info.memory_bytes / 2**20:.1f} MiB"
+    if info.index_bytes:
+        memory += f", and {info.index_bytes / 2**20:.1f} MiB of spatial indices"
+    lines += [memory, f"followers  {info.followers}"]
     if info.bounds is not None:
         low, high = (" ".join(f"{x:g}" for x in corner) for corner in info.bounds)
         lines.append(f"bounds     ({low}) to ({high})")

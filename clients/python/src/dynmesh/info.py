@@ -71,6 +71,8 @@ class SessionInfo:
         Tells this session from an earlier or later one of the same name.
     euler_characteristic : int
         V - E + F - C.
+    memory_bytes, index_bytes : int
+        Of the mesh; of the spatial indices, which queries by place make.
     stored_relations : dict of (EntityKind, EntityKind) to int
         Relations that are kept as tables, and the bytes of each, which are part of `memory_bytes`.
     bounds : float64[2, 3] or None
@@ -91,6 +93,7 @@ class SessionInfo:
     euler_characteristic: int
     checksum: Checksum
     memory_bytes: int
+    index_bytes: int
     followers: int
     attributes: tuple[AttributeSpec, ...]
     stored_relations: dict[Relation, int]
@@ -113,6 +116,7 @@ class SessionInfo:
             "euler_characteristic": self.euler_characteristic,
             "checksum": str(self.checksum),
             "memory_bytes": self.memory_bytes,
+            "index_bytes": self.index_bytes,
             "followers": self.followers,
             "attributes": [{**spec._asdict(), "kind": str(spec.kind)} for spec in self.attributes],
             "stored_relations": {
@@ -156,6 +160,7 @@ def info_from_proto(message: sessions_pb2.Session) -> SessionInfo:
         euler_characteristic=message.euler_characteristic,
         checksum=checksum_from_proto(message.checksum),
         memory_bytes=message.memory_bytes,
+        index_bytes=message.index_bytes,
         followers=message.followers,
         attributes=tuple(_spec_from_proto(spec) for spec in message.attributes),
         stored_relations={

@@ -110,61 +110,63 @@ class Surface:
             raise make_error(code, message, reason, dict(metadata)) from None
 
 
-def selections_of(ids: Selection) -> list[types_pb2.Selection]:
+def selections_of(ids: Selection, **filters: Any) -> list[types_pb2.Selection]:
     """`ids` for the wire: one selection, or several where a single message could not hold the list.
+
+    `filters` are the other fields of each.
 
     Raises `InvalidArgumentError` for anything but ids, and for a slice with a step or negative ends.
     """
     if ids is None:
-        return [types_pb2.Selection(all=True)]
+        return [types_pb2.Selection(all=True, **filters)]
     if isinstance(ids, slice):
-        return [types_pb2.Selection(range=_range_of(ids))]
+        return [types_pb2.Selection(range=_range_of(ids), **filters)]
     array = as_ids(ids)
     step = CHUNK_BYTES // 4
     parts = [array[begin : begin + step] for begin in range(0, max(array.size, 1), step)]
-    return [types_pb2.Selection(ids=u32_bytes(part)) for part in parts]
+    return [types_pb2.Selection(ids=u32_bytes(part), **filters) for part in parts]
 
 
 def read_neighbors(replies: Iterable[queries_pb2.GetNeighborsResponse]) -> Csr:
     """Joins the chunks of an answer."""
     chunks = list(replies)
     return Csr(
-        ids=_joined(chunks, "ids"),
-        offsets=_joined_offsets(chunks, "offsets"),
-        neighbors=_joined(chunks, "neighbors"),
-        revision=_revision(chunks),
+        ids=joined(chunks, "ids"),
+        offsets=joined_offsets(chunks, "offsets"),
+        neighbors=joined(chunks, "neighbors"),
+        revision=revision_of(chunks),
     )
 
 
 def read_entities(kind: EntityKind, replies: Iterable[queries_pb2.GetEntitiesResponse]) -> Entities:
     """Joins the chunks of an answer."""
     chunks = list(replies)
-    flags = _joined(chunks, "flags", "u1")
+    flags = joined(chunks, "flags", "u1")
     return Entities(
         kind=kind,
-        ids=_joined(chunks, "ids"),
-        positions=_joined(chunks, "positions", "<f8").reshape(-1, 3),
-        types=_joined(chunks, "types", "u1"),
-        vertex_offsets=_joined_offsets(chunks, "vertex_offsets"),
-        vertices=_joined(chunks, "vertices"),
+        ids=joined(chunks, "ids"),
+        positions=joined(chunks, "positions", "<f8").reshape(-1, 3),
+        types=joined(chunks, "types", "u1"),
+        vertex_offsets=joined_offsets(chunks, "vertex_offsets"),
+        vertices=joined(chunks, "vertices"),
         is_element=(flags & _IS_ELEMENT) != 0,
         on_boundary=(flags & _ON_BOUNDARY) != 0,
         is_duplicate=(flags & _IS_DUPLICATE) != 0,
-        born_revisions=_joined(chunks, "born_revisions", "<i8"),
-        revision=_revision(chunks),
+        born_revisions=joined(chunks, "born_revisions", "<i8"),
+        revision=revision_of(chunks),
     )
 
 
 def read_boundary(replies: Iterable[queries_pb2.GetBoundaryResponse]) -> tuple[Ids, int]:
     """Ids and revision."""
     chunks = list(replies)
-    return _joined(chunks, "ids"), _revision(chunks)
+    return joined(chunks, "ids"), revision_of(chunks)
 
 
 def read_surface(replies: Iterable[queries_pb2.GetBoundarySurfaceResponse]) -> Surface:
     """Joins the chunks of the file."""
     chunks = list(replies)
-    return Surface(b"".join(chunk.drc for chunk in chunks), _revision(chunks))
+    return Surface(b"".join(chunk.drc for chunk in chunks), revision_of(chunks))
 
 
 def _range_of(ids: slice) -> types_pb2.Selection.Range:
@@ -174,12 +176,13 @@ def _range_of(ids: slice) -> types_pb2.Selection.Range:
     return types_pb2.Selection.Range(begin=min(ids.start or 0, end), end=end)
 
 
-def _joined(chunks: list[Any], field: str, dtype: str = "<u4") -> NDArray[Any]:
+def joined(chunks: list[Any], field: str, dtype: str = "<u4") -> NDArray[Any]:
+    """One array of an answer, from its chunks."""
     parts = [from_bytes(getattr(chunk, field), dtype) for chunk in chunks]
     return concatenate(parts, np.dtype(dtype).newbyteorder("="))
 
 
-def _joined_offsets(chunks: list[Any], field: str) -> NDArray[np.int64]:
+def joined_offsets(chunks: list[Any], field: str) -> NDArray[np.int64]:
     """Offsets of all rows, from offsets that begin with 0 in each chunk."""
     offsets = [from_bytes(getattr(chunk, field), "<u4") for chunk in chunks]
     sizes = [np.diff(part.astype(np.int64)) for part in offsets if part.size]
@@ -190,7 +193,7 @@ def _joined_offsets(chunks: list[Any], field: str) -> NDArray[np.int64]:
     )
 
 
-def _revision(chunks: list[Any]) -> int:
+def revision_of(chunks: list[Any]) -> int:
     """That of all chunks. Only a list of ids that took several calls can have met an edit in between."""
     revisions = {int(chunk.revision) for chunk in chunks}
     if len(revisions) > 1:

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 import grpc
+from numpy.typing import ArrayLike
 
 from ._calls import Caller
-from .arrays import Ids, Points, as_int64
+from .arrays import Ids, Points, as_count, as_int64
 from .files import PathLike
 from .info import Counts, SessionInfo, info_from_proto
 from .kinds import KindLike, as_kind
+from .place_reader import PlaceReader
+from .places import box_message
 from .progress import Progress
 from .queries import (
     Csr,
@@ -36,7 +37,7 @@ if TYPE_CHECKING:
 FOREVER = float("inf")
 
 
-class SessionReader:
+class SessionReader(PlaceReader):
     """Reads one session. Every method is one call, and every answer speaks of one revision."""
 
     def __init__(self, name: str, channel: grpc.Channel, caller: Caller) -> None:
@@ -67,6 +68,9 @@ class SessionReader:
         to_kind: KindLike,
         ids: Selection = None,
         *,
+        rings: int = 1,
+        boundary_only: bool = False,
+        box: ArrayLike | None = None,
         as_of_revision: int = 0,
         timeout: float | None = None,
     ) -> Csr:
@@ -81,27 +85,48 @@ class SessionReader:
         from_kind, to_kind : "vertex", "edge", "face" or "cell"
         ids : uint32[n], slice or None
             Entities of `from_kind`; a slice means all live ones in that range, None all live ones.
+        rings : int
+            What lies in at most so many steps to an adjacent entity: 1 to 1000; more than 1 only from a kind to
+            itself.
+        boundary_only : bool
+            Leave out entities of `from_kind` that are not on the boundary. Not for cells.
+        box : float64[2, 3] or None
+            Low and high corner: leave out entities of `from_kind` whose bounding box does not meet this one.
         as_of_revision : int
             The revision at which `ids` were read: an id whose occupant was born later is refused with
             `NotFoundError` ENTITY_REMOVED. 0: the current one.
+
+        Raises
+        ------
+        NotFoundError
+            ENTITY_REMOVED, UNKNOWN_ENTITY: `ids` that are not live.
+        InvalidArgumentError
+            For what makes no sense: a box with low above high, rings between kinds, ...
+        ResourceExhaustedError
+            LIMIT_EXCEEDED: more work or a larger answer than the server allows.
         """
-        origin, target = int(as_kind(from_kind)), int(as_kind(to_kind))
+        asked = {"from": int(as_kind(from_kind)), "to": int(as_kind(to_kind)), "rings": as_count(rings, "rings")}
         requests = [
-            queries_pb2.GetNeighborsRequest(
-                **{"from": origin}, to=target, **self._selected(part, as_of_revision)
-            )
-            for part in selections_of(ids)
+            queries_pb2.GetNeighborsRequest(**asked, **self._selected(part, as_of_revision))
+            for part in selections_of(ids, **_filters(boundary_only, box))
         ]
         return read_neighbors(self._replies(self._queries.GetNeighbors, requests, timeout))
 
     def entities(
-        self, kind: KindLike, ids: Selection = None, *, as_of_revision: int = 0, timeout: float | None = None
+        self,
+        kind: KindLike,
+        ids: Selection = None,
+        *,
+        boundary_only: bool = False,
+        box: ArrayLike | None = None,
+        as_of_revision: int = 0,
+        timeout: float | None = None,
     ) -> Entities:
         """Vertices, types and flags of entities; positions of vertices. Parameters as in `neighbors`."""
         of_kind = as_kind(kind)
         requests = [
             queries_pb2.GetEntitiesRequest(kind=int(of_kind), **self._selected(part, as_of_revision))
-            for part in selections_of(ids)
+            for part in selections_of(ids, **_filters(boundary_only, box))
         ]
         return read_entities(of_kind, self._replies(self._queries.GetEntities, requests, timeout))
 
@@ -161,5 +186,6 @@ class SessionReader:
     def _selected(self, selection: types_pb2.Selection, as_of_revision: int) -> dict[str, Any]:
         return {"session": self.name, "selection": selection, "as_of_revision": as_int64(as_of_revision, "as_of_revision")}
 
-    def _replies(self, method: Any, requests: list[Any], timeout: float | None) -> Iterator[Any]:
-        return chain.from_iterable(self._caller.stream(method, request, timeout) for request in requests)
+
+def _filters(boundary_only: bool, box: ArrayLike | None) -> dict[str, Any]:
+    return {"boundary_only": bool(boundary_only), "box": None if box is None else box_message(box)}
