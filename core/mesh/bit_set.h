@@ -74,6 +74,21 @@ class BitSet {
     }
   }
 
+  /// Calls fn(begin, end) for runs of members that follow each other, ascending, at most 64 each.
+  template <typename Fn>
+  void ForEachRun(Fn fn) const {
+    for (size_t word = NextWord(0); word != kNone; word = NextWord(word + 1)) {
+      const Slot base = word * 64;
+      for (uint64_t bits = words_[word]; bits != 0;) {
+        const int begin = std::countr_zero(bits);
+        const int end = begin + std::countr_one(bits >> begin);
+        fn(base + begin, base + end);
+        if (end == 64) break;
+        bits = bits >> end << end;
+      }
+    }
+  }
+
   /// Writes the smallest members >= slot, at most `max_members` of them, to `out`; returns how many. The next
   /// call may go on at the last one + 1. Cost: as Next, but a word at a time.
   size_t Collect(Slot slot, Slot* out, size_t max_members) const {

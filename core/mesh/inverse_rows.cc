@@ -1,13 +1,12 @@
 #include "core/mesh/inverse_rows.h"
 
-#include <array>
-
-#include "core/mesh/row_block.h"
+#include "core/mesh/relations.h"
 
 namespace dynmesh {
 namespace {
 
 constexpr uint32_t kFew = 1000;
+constexpr Relation kVertexFaces = {EntityKind::kVertex, EntityKind::kFace};
 constexpr uint64_t kMaxEntries = uint64_t{1} << 31;
 
 template <typename Fn>
@@ -15,45 +14,22 @@ void ForEachLive(const Mesh& mesh, EntityKind kind, Fn fn) {
   mesh.slots(kind).live().ForEach(fn);
 }
 
-/// Calls fn(cell, edge) for the edges of every cell.
-template <typename Fn>
-void ForEachCellEdge(const Mesh& mesh, Fn fn) {
-  std::array<Slot, RowBlock::kMaxRows> part;
-  RowBlock block;
-  for (Slot next = 0;;) {
-    const size_t count = mesh.slots(EntityKind::kCell).live().Collect(next, part.data(), part.size());
-    if (count == 0) return;
-    block.Gather(mesh, kStorableRelations[0], absl::MakeConstSpan(part.data(), count));
-    for (size_t i = 0; i < count; ++i) {
-      for (Slot e : block.Row(i)) fn(part[i], e);
-    }
-    next = part[count - 1] + 1;
-  }
-}
-
 /// Calls fn(neighbor, slot) for every entry `neighbor` of every row `slot` of vertex->vertices,
 /// vertex->faces, vertex->cells or edge->cells, neighbours ascending; perhaps more than once, and for slot =
 /// neighbor.
 template <typename Fn>
 void ForEachEntry(const Mesh& mesh, Relation relation, Fn fn) {
-  switch (relation.to) {
-    case EntityKind::kFace:
-      return ForEachLive(mesh, EntityKind::kFace, [&](Slot f) {
-        for (VertexId v : mesh.Vertices(FaceId(f))) fn(f, v.slot());
-      });
-    case EntityKind::kCell:
-      if (relation.from == EntityKind::kEdge) return ForEachCellEdge(mesh, fn);
-      return ForEachLive(mesh, EntityKind::kCell, [&](Slot c) {
-        for (VertexId v : mesh.Vertices(CellId(c))) fn(c, v.slot());
-      });
-    default:
-      return ForEachLive(mesh, EntityKind::kVertex, [&](Slot w) {
-        for (EdgeId e : mesh.IncidentEdges(VertexId(w))) {
-          const auto ends = mesh.Vertices(e);
-          fn(w, ends[0].slot() ^ ends[1].slot() ^ w);
-        }
-      });
+  if (relation.to != relation.from) {
+    return ForEachRow(mesh, {relation.to, relation.from}, [&](Slot upper, absl::Span<const Slot> row) {
+      for (Slot lower : row) fn(upper, lower);
+    });
   }
+  ForEachRow(mesh, {EntityKind::kVertex, EntityKind::kEdge}, [&](Slot w, absl::Span<const Slot> edges) {
+    for (Slot e : edges) {
+      const auto ends = mesh.Vertices(EdgeId(e));
+      fn(w, ends[0].slot() ^ ends[1].slot() ^ w);
+    }
+  });
 }
 
 /// No fewer than the entries of each row.
@@ -62,6 +38,12 @@ std::vector<uint32_t> RowBounds(const Mesh& mesh, Relation relation) {
   if (relation.to == EntityKind::kVertex) {
     ForEachLive(mesh, EntityKind::kVertex,
                 [&](Slot v) { bounds[v] = mesh.IncidentEdges(VertexId(v)).size(); });
+  } else if (relation == kVertexFaces && mesh.IsPlain()) {  // two edges of each face meet at a vertex of it
+    ForEachRow(mesh, {EntityKind::kEdge, EntityKind::kVertex}, [&](Slot e, absl::Span<const Slot> ends) {
+      const uint32_t faces = mesh.IncidentFaces(EdgeId(e)).size();
+      for (Slot v : ends) bounds[v] += faces;
+    });
+    for (uint32_t& bound : bounds) bound /= 2;
   } else {
     ForEachEntry(mesh, relation, [&](Slot, Slot slot) { ++bounds[slot]; });
   }

@@ -187,6 +187,26 @@ absl::Status Mesh::StoreRelation(Relation relation, bool on) {
   return absl::OkStatus();
 }
 
+Mesh::FixedRows Mesh::FixedRowsOf(Relation relation) const {
+  const auto rows = [](const auto* ids, size_t stride) {
+    static_assert(sizeof(*ids) % sizeof(Slot) == 0);
+    return FixedRows{reinterpret_cast<const Slot*>(ids), stride};
+  };
+  if (relation == Relation{EntityKind::kEdge, EntityKind::kVertex}) return rows(edge_vertices_.data(), 2);
+  if (relation.from == EntityKind::kFace && face_stride_ == 3) {
+    if (relation.to == EntityKind::kVertex) return rows(face_vertices_.data(), 3);
+    if (relation.to == EntityKind::kEdge) return rows(face_edges_.data(), 3);
+  }
+  if (relation == Relation{EntityKind::kCell, EntityKind::kVertex} && IsTetrahedral()) {
+    return rows(cell_vertices_.data(), 4);
+  }
+  const CellEdgeRows* edges = stored_.cell_edges();
+  if (relation == kStorableRelations[0] && edges != nullptr && edges->stride() != 0) {
+    return rows(edges->data(), edges->stride());
+  }
+  return {};
+}
+
 // ---- Batches ----
 
 void Mesh::BeginBatch() {

@@ -169,6 +169,19 @@ class Mesh {
   /// The face (not a duplicate) with this vertex cycle, in any rotation and either direction.
   FaceId FindFace(absl::Span<const VertexId> vertices) const;
 
+  /// The rows of a relation as one array: the row of a live slot is ids[stride * slot .. stride * (slot +
+  /// 1)).
+  struct FixedRows {
+    const Slot* ids = nullptr;
+    size_t stride = 0;
+  };
+  /// Of edge->vertices; face->vertices and ->edges where all faces are triangles; cell->vertices where all
+  /// cells are tetrahedra; cell->edges where it is stored and all cells have as many. Else no ids. Valid
+  /// until the next edit.
+  FixedRows FixedRowsOf(Relation relation) const;
+  /// Whether no cell of another type was ever there.
+  bool IsTetrahedral() const { return cell_vertex_stride_ == NumVertices(ElementType::kTetrahedron); }
+
   // ---- Boundary: known at any moment, listed without a traversal ----
 
   /// Faces with exactly one cell use; edges of such faces, and edges with exactly one face use; vertices of

@@ -107,6 +107,65 @@ void ForEachRow(const Mesh& mesh, Relation relation, absl::Span<const Slot> slot
   }
 }
 
+/// Calls fn(slot, row) for slots whose rows of kStride entries follow each other from `ids` on.
+template <size_t kStride, typename Fn>
+void ForEachFixedRow(const Slot* ids, Slot begin, Slot end, Fn& fn) {
+  for (Slot slot = begin; slot < end; ++slot, ids += kStride) fn(slot, absl::Span<const Slot>(ids, kStride));
+}
+
+/// All rows from one array, with a length that the compiler knows.
+template <size_t kStride, typename Fn>
+void ForEachFixedRow(const BitSet& live, const Slot* ids, Fn& fn) {
+  live.ForEachRun(
+      [&](Slot begin, Slot end) { ForEachFixedRow<kStride>(ids + kStride * begin, begin, end, fn); });
+}
+
+/// All rows of cell->faces of a mesh of tetrahedra, without their orientation codes.
+template <typename Fn>
+void ForEachTetrahedronFaces(const Mesh& mesh, Fn& fn) {
+  mesh.slots(EntityKind::kCell).live().ForEachRun([&](Slot begin, Slot end) {
+    std::array<Slot, 4 * 64> faces;
+    const OrientedFace* oriented = mesh.Faces(CellId(begin)).data();
+    for (size_t i = 0; i < 4 * (end - begin); ++i) faces[i] = oriented[i].face().slot();
+    ForEachFixedRow<4>(faces.data(), begin, end, fn);
+  });
+}
+
+/// All rows of cell->edges of a mesh of tetrahedra.
+template <typename Fn>
+void ForEachTetrahedronEdges(const Mesh& mesh, Fn& fn) {
+  mesh.slots(EntityKind::kCell).live().ForEachRun([&](Slot begin, Slot end) {
+    std::array<Slot, 6 * 64> edges;
+    CopyTetrahedronEdges(mesh, begin, end, edges.data());
+    ForEachFixedRow<6>(edges.data(), begin, end, fn);
+  });
+}
+
+/// All rows, where they are of one length and no list; false for other relations.
+template <typename Fn>
+bool ForEachFixedRow(const Mesh& mesh, Relation relation, Fn& fn) {
+  const BitSet& live = mesh.slots(relation.from).live();
+  const auto [ids, stride] = mesh.FixedRowsOf(relation);
+  switch (ids == nullptr ? 0 : stride) {
+    case 2:
+      return ForEachFixedRow<2>(live, ids, fn), true;
+    case 3:
+      return ForEachFixedRow<3>(live, ids, fn), true;
+    case 4:
+      return ForEachFixedRow<4>(live, ids, fn), true;
+    case 6:
+      return ForEachFixedRow<6>(live, ids, fn), true;
+    case 12:
+      return ForEachFixedRow<12>(live, ids, fn), true;
+    default:
+      break;
+  }
+  if (relation.from != EntityKind::kCell || !mesh.IsTetrahedral()) return false;
+  if (relation.to == EntityKind::kFace) return ForEachTetrahedronFaces(mesh, fn), true;
+  if (relation.to == EntityKind::kEdge) return ForEachTetrahedronEdges(mesh, fn), true;
+  return false;
+}
+
 }  // namespace internal
 
 /// Calls fn(slot, row) for each of `slots`, in order; a row is valid during the call. Nothing is gathered in
@@ -120,6 +179,7 @@ void ForEachRow(const Mesh& mesh, Relation relation, absl::Span<const Slot> slot
 /// The same for all live entities of relation.from, ascending: cheaper than naming them (InverseRows).
 template <typename Fn>
 void ForEachRow(const Mesh& mesh, Relation relation, Fn fn) {
+  if (internal::ForEachFixedRow(mesh, relation, fn)) return;
   const BitSet& live = mesh.slots(relation.from).live();
   if (!mesh.stored().Has(relation) && InverseRows::Pays(mesh, relation)) {
     const InverseRows rows(mesh, relation);

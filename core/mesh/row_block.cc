@@ -58,6 +58,22 @@ class RowKernels {
  public:
   RowKernels(const Mesh& mesh, RowBlock& block) : mesh_(mesh), block_(block), plain_(mesh.IsPlain()) {}
 
+  static void CopyTetrahedronEdges(const Mesh& mesh, Slot begin, Slot end, Slot* out) {
+    const OrientedFace* const faces = mesh.cell_faces_.data();
+    const EdgeId* const edges = mesh.face_edges_.data();
+    const size_t stride = mesh.face_stride_;
+    const Slot last = mesh.slots(EntityKind::kCell).limit() - 1;
+    const Slot far = std::min<Slot>(begin + kAhead, last);
+    const bool scattered = Distance(faces[4 * size_t{begin}], faces[4 * size_t{far}]) > kAhead * kAhead;
+    for (Slot c = begin; c < end; ++c, out += 6) {
+      if (scattered) {
+        const OrientedFace* const ahead = faces + 4 * size_t{std::min<Slot>(c + kAhead, last)};
+        for (int i = 0; i < 3; ++i) __builtin_prefetch(edges + ahead[i].face().slot() * stride);
+      }
+      TetEdges(faces + 4 * size_t{c}, edges, stride, out);
+    }
+  }
+
   void Gather(Relation relation, absl::Span<const Slot> slots) {
     block_.size_ = 0;
     block_.offsets_[0] = 0;
@@ -371,6 +387,11 @@ class RowKernels {
     block_.size_ = out - begin;
   }
 
+  static size_t Distance(OrientedFace a, OrientedFace b) {
+    const Slot one = a.face().slot(), other = b.face().slot();
+    return one < other ? other - one : one - other;
+  }
+
   /// Whether the faces of cells that follow each other lie far apart, so that fetching them ahead pays.
   bool IsScattered(absl::Span<const Slot> slots) const {
     size_t distance = 0;
@@ -419,6 +440,10 @@ class RowKernels {
   const bool plain_;
   std::vector<Corner> corners_;
 };
+
+void CopyTetrahedronEdges(const Mesh& mesh, Slot begin, Slot end, Slot* out) {
+  RowKernels::CopyTetrahedronEdges(mesh, begin, end, out);
+}
 
 void RowBlock::Gather(const Mesh& mesh, Relation relation, absl::Span<const Slot> slots) {
   RowKernels(mesh, *this).Gather(relation, slots);

@@ -87,6 +87,10 @@ class CellEdgeRows {
     return absl::MakeConstSpan(&edges_[size_t{c} * stride_], lengths_.empty() ? stride_ : lengths_[c]);
   }
 
+  /// Entries of each row; 0 while they differ, or there are none.
+  size_t stride() const { return lengths_.empty() ? stride_ : 0; }
+  const Slot* data() const { return edges_.data(); }
+
   void Put(Slot c, absl::Span<const Slot> edges) {
     if (edges.size() != stride_) PrepareFor(edges.size());
     if (size_t{c} * stride_ >= edges_.size()) edges_.resize((size_t{c} + 1) * stride_, kNoSlot);

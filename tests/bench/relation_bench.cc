@@ -6,11 +6,16 @@
 
 #include "core/mesh/relations.h"
 #include "tests/bench/digest.h"
-#include "tests/bench/stored_lists.h"
 #include "tests/bench/tasks.h"
 
 namespace dynmesh::bench {
 namespace {
+
+/// Whether a Mesh always has the relation: the downward ones but cell->edges, and upward by one dimension.
+constexpr bool IsAlwaysStored(Relation relation) {
+  const int from = Dimension(relation.from), to = Dimension(relation.to);
+  return to < from ? !(from == 3 && to == 1) : to == from + 1;
+}
 
 /// `walk(fn)` calls fn(slot, row) for every row.
 template <typename Walk>
@@ -64,7 +69,6 @@ class RelationTask {
     }
     template <typename Fn>
     void Stored(Fn& fn) const {
-      if (!IsStorable()) return ForEachStoredList(fixture->mesh, relation, fn);
       ForEachRow(fixture->stored, relation, [&](Slot slot, absl::Span<const Slot> row) { fn(slot, row); });
     }
   };

@@ -50,8 +50,13 @@ TEST(BitSetTest, ListsAndCollectsItsMembersWhateverTheirDensity) {
       expected.push_back(slot);
     }
     std::vector<Slot> members = {7};
+    std::vector<Slot> of_runs;
+    set.ForEachRun([&](Slot begin, Slot end) {
+      for (; begin < end; ++begin) of_runs.push_back(begin);
+    });
     set.ListMembers(members);
     EXPECT_EQ(members, expected) << "one in " << one_in;
+    EXPECT_EQ(of_runs, expected) << "one in " << one_in;
     for (size_t step : {1u, 63u, 64u, 65u, 1000u}) {
       std::vector<Slot> collected;
       std::vector<Slot> part(step);
