@@ -36,7 +36,7 @@ tsan:
 
 define sanitize_with
 scripts/setup.sh build test && cmake --preset $(1) > /dev/null && \
-cmake --build --preset $(1) -j $(JOBS) && ctest --preset $(1)
+cmake --build --preset $(1) -j $(JOBS) && ctest --preset $(1) -j $(JOBS)
 endef
 
 bench:
