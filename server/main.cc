@@ -70,7 +70,7 @@ ABSL_FLAG(uint32_t, max_concurrent_imports, dynmesh::Limits().max_concurrent_imp
 ABSL_FLAG(uint64_t, max_staged_bytes, dynmesh::Limits().max_staged_bytes,
           "What imports have received and not built yet, all together");
 ABSL_FLAG(absl::Duration, import_idle_timeout, dynmesh::Limits().import_idle_timeout,
-          "How long an import may send nothing");
+          "How long an import may send nothing, or not read what it is told");
 ABSL_FLAG(uint32_t, max_queued_tasks, dynmesh::Limits().max_queued_tasks,
           "Calls that wait for a thread or for their session, for each of the two pools of threads");
 ABSL_FLAG(uint64_t, max_queued_bytes, dynmesh::Limits().max_queued_bytes, "Requests of the calls that wait");

@@ -175,14 +175,14 @@ void Mesh::ZeroAttributes(EntityId id) {
 
 // ---- Stored relations ----
 
-absl::Status Mesh::StoreRelation(Relation relation, bool on) {
+absl::Status Mesh::StoreRelation(Relation relation, bool on, WorkMeter& meter) {
   if (StorableIndex(relation) == kNumStorableRelations) {
     return InvalidArgument(reason::kBadArgument,
                            absl::StrCat("the relation ", EntityKindName(relation.from), " -> ",
                                         EntityKindName(relation.to), " cannot be switched"));
   }
   if (stored_.Has(relation) == on) return absl::OkStatus();
-  if (on) return stored_.Build(*this, relation);
+  if (on) return stored_.Build(*this, relation, meter);
   stored_.Drop(relation);
   return absl::OkStatus();
 }

@@ -233,9 +233,10 @@ class Mesh {
 
   const StoredRelations& stored() const { return stored_; }
   /// Keeps a table of the relation current from now on, or forgets it. Answers are the same either way.
-  /// Errors: INVALID_ARGUMENT BAD_ARGUMENT unless it is one of kStorableRelations; RESOURCE_EXHAUSTED.
-  /// Cost: to switch on, all rows.
-  absl::Status StoreRelation(Relation relation, bool on);
+  /// Errors: INVALID_ARGUMENT BAD_ARGUMENT unless it is one of kStorableRelations; RESOURCE_EXHAUSTED; those
+  /// of `meter`, which is charged the table's bytes before they are taken. Nothing changed then. Cost: to
+  /// switch on, all rows.
+  absl::Status StoreRelation(Relation relation, bool on, WorkMeter& meter = WorkMeter::Unlimited());
 
   // ---- Batches ----
 

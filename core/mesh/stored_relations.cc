@@ -1,11 +1,45 @@
 #include "core/mesh/stored_relations.h"
 
 #include <algorithm>
+#include <array>
 #include <utility>
 
 #include "core/mesh/relations.h"
 
 namespace dynmesh {
+namespace {
+
+constexpr uint64_t kBytesOfList = 2 * sizeof(uint32_t);
+
+/// Calls fn(slot, row) for all rows; what fn returns is charged as bytes, what it costs as steps, for many
+/// rows at once. Errors: the meter's.
+template <typename Fn>
+absl::Status ForEachMeteredRow(const Mesh& mesh, Relation relation, WorkMeter& meter, Fn fn) {
+  uint64_t bytes = 0, steps = 0;
+  const auto take = [&](Slot slot, absl::Span<const Slot> row) {
+    bytes += fn(slot, row);
+    steps += 1 + row.size();
+  };
+  const auto charge = [&] {
+    const absl::Status charged = meter.ChargeBytes(std::exchange(bytes, 0));
+    const uint64_t made = std::min(std::exchange(steps, 0), WorkMeter::kMaxCharge);
+    return charged.ok() ? meter.ChargeSteps(made) : charged;
+  };
+  if (InverseRows::Pays(mesh, relation)) {  // in linear time
+    ForEachRow(mesh, relation, take);
+    return charge();
+  }
+  std::array<Slot, RowBlock::kMaxRows> part;
+  for (Slot next = 0;;) {
+    const size_t count = mesh.slots(relation.from).live().Collect(next, part.data(), part.size());
+    if (count == 0) return absl::OkStatus();
+    ForEachRow(mesh, relation, absl::MakeConstSpan(part.data(), count), take);
+    DYNMESH_RETURN_IF_ERROR(charge());
+    next = part[count - 1] + 1;
+  }
+}
+
+}  // namespace
 
 bool StoredRelations::Has(Relation relation) const {
   return StorableIndex(relation) == kCellEdges ? cell_edges_.has_value() : Find(relation) != nullptr;
@@ -16,31 +50,43 @@ bool StoredRelations::HasRoom(uint32_t count) const {
                      [&](const Table& table) { return !table.has_value() || table->HasRoom(count); });
 }
 
-absl::Status StoredRelations::Build(const Mesh& mesh, Relation relation) {
-  if (StorableIndex(relation) == kCellEdges) {
-    CellEdgeRows rows;
-    ForEachRow(mesh, relation, [&](Slot c, absl::Span<const Slot> edges) { rows.Put(c, edges); });
-    cell_edges_ = std::move(rows);
-    return absl::OkStatus();
-  }
+absl::Status StoredRelations::Build(const Mesh& mesh, Relation relation, WorkMeter& meter) {
+  if (StorableIndex(relation) == kCellEdges) return BuildCellEdges(mesh, meter);
   std::vector<uint32_t> lengths(mesh.slots(relation.from).limit());
   uint64_t entries = 0;
-  ForEachRow(mesh, relation, [&](Slot slot, absl::Span<const Slot> row) {
-    lengths[slot] = row.size() <= StoredRows::kMaxRow ? row.size() : 0;
-    entries += lengths[slot];
-  });
+  DYNMESH_RETURN_IF_ERROR(meter.ChargeBytes(lengths.size() * kBytesOfList));
+  DYNMESH_RETURN_IF_ERROR(
+      ForEachMeteredRow(mesh, relation, meter, [&](Slot slot, absl::Span<const Slot> row) {
+        lengths[slot] = row.size() <= StoredRows::kMaxRow ? row.size() : 0;
+        entries += lengths[slot];
+        return lengths[slot] * sizeof(Slot);
+      }));
   if (entries >= StoredRows::kMaxEntries) {
     return LimitExceeded("max_stored_neighbors", StoredRows::kMaxEntries, entries);
   }
   StoredRows table;
   table.Layout(lengths);
-  ForEachRow(mesh, relation, [&](Slot slot, absl::Span<const Slot> row) {
-    if (row.size() > StoredRows::kMaxRow) return table.Open(slot);
-    for (Slot neighbor : row) table.Append(slot, neighbor);
-  });
+  DYNMESH_RETURN_IF_ERROR(
+      ForEachMeteredRow(mesh, relation, meter, [&](Slot slot, absl::Span<const Slot> row) {
+        if (row.size() > StoredRows::kMaxRow) table.Open(slot);
+        for (size_t i = 0; i < row.size() && row.size() <= StoredRows::kMaxRow; ++i)
+          table.Append(slot, row[i]);
+        return 0;
+      }));
   if (StorableIndex(relation) == kCellCells) OpenCrowds(mesh, table);
   tables_[StorableIndex(relation)] = std::move(table);
   ++num_tables_;
+  return absl::OkStatus();
+}
+
+absl::Status StoredRelations::BuildCellEdges(const Mesh& mesh, WorkMeter& meter) {
+  CellEdgeRows rows;
+  DYNMESH_RETURN_IF_ERROR(ForEachMeteredRow(mesh, kStorableRelations[kCellEdges], meter,
+                                            [&](Slot c, absl::Span<const Slot> edges) {
+                                              rows.Put(c, edges);
+                                              return edges.size() * sizeof(Slot);
+                                            }));
+  cell_edges_ = std::move(rows);
   return absl::OkStatus();
 }
 

@@ -9,6 +9,7 @@
 #include "core/mesh/ids.h"
 #include "core/mesh/relation.h"
 #include "core/mesh/stored_rows.h"
+#include "core/mesh/work_meter.h"
 
 namespace dynmesh {
 
@@ -31,9 +32,9 @@ class StoredRelations {
   /// Whether `count` entries more have room within the 32-bit limits of every table.
   bool HasRoom(uint32_t count) const;
 
-  /// Fills a table from `mesh`. Errors: RESOURCE_EXHAUSTED. REQUIRES: the relation is storable and not
-  /// stored.
-  absl::Status Build(const Mesh& mesh, Relation relation);
+  /// Fills a table from `mesh`; charges `meter` its bytes before they are taken. Errors: RESOURCE_EXHAUSTED;
+  /// the meter's; nothing changed then. REQUIRES: the relation is storable and not stored.
+  absl::Status Build(const Mesh& mesh, Relation relation, WorkMeter& meter);
   void Drop(Relation relation);
   /// Bytes of one table; 0 when it is not stored.
   size_t memory_bytes(Relation relation) const;
@@ -57,6 +58,7 @@ class StoredRelations {
   /// The rows of all cells of a face with more uses are open.
   static constexpr uint32_t kMaxJoinedUses = StoredRows::kMaxRow + 1;
 
+  absl::Status BuildCellEdges(const Mesh& mesh, WorkMeter& meter);
   static void OpenCrowds(const Mesh& mesh, StoredRows& table);
   void JoinCells(const Mesh& mesh, CellId c, FaceId f);
 

@@ -149,7 +149,7 @@ void ImportReactor::OnWriteDone(bool ok) {
   }
   if (!ok) cancelled_ = true;
   if (phase == Phase::kFinishing) return EndWith(end);
-  if (phase == Phase::kAnswering) return ok ? WriteIds() : EndAnswer(CallCancelled());
+  if (phase == Phase::kAnswering) return ok ? WriteIds() : EndWith(CallCancelled());
   if (phase != Phase::kAnnouncing) return;
   if (!ok) return EndWith(CallCancelled());
   if (progress_.progress().phase() != kBuilding) return Announce();
@@ -158,11 +158,13 @@ void ImportReactor::OnWriteDone(bool ok) {
 
 void ImportReactor::Build() {
   const absl::Status built = CatchExceptions([this]() -> absl::Status {
+    DYNMESH_RETURN_IF_ERROR(lease_.Grow(importer_->num_slot_bytes()));  // before anything is changed
     DYNMESH_ASSIGN_OR_RETURN(answer_, importer_->Finish(*this));
     FromImportOutcome(*answer_.outcome, result_.mutable_result());
     return absl::OkStatus();
   });
-  if (!built.ok()) return EndAnswer(built);
+  importer_ = nullptr;  // leaves the gate before the peer knows that it may come again
+  if (!built.ok()) return EndWith(built);
   WatchUntil(absl::Now() + services_.limits().import_idle_timeout);
   {
     MutexLock lock(&mu_);
@@ -173,13 +175,9 @@ void ImportReactor::Build() {
   WriteIds();
 }
 
-void ImportReactor::EndAnswer(const absl::Status& status) {
-  importer_ = nullptr;  // leaves the gate before the peer knows that it may come again
-  EndWith(status);
-}
-
 bool ImportReactor::TakeIds() {
   while (ids_kind_ < kNumEntityKinds && ids_next_ == answer_.slots[ids_kind_].size()) {
+    lease_.Shrink(ids_next_ * sizeof(Slot));
     answer_.slots[ids_kind_++] = {};
     ids_next_ = 0;
   }
@@ -193,7 +191,7 @@ bool ImportReactor::TakeIds() {
 }
 
 void ImportReactor::WriteIds() {
-  if (!TakeIds()) return EndAnswer(absl::OkStatus());
+  if (!TakeIds()) return EndWith(absl::OkStatus());
   {
     MutexLock lock(&mu_);
     writing_ = true;

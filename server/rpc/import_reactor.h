@@ -24,14 +24,14 @@ namespace dynmesh {
 ///
 /// The announcement has to be written before the build begins: a read that ends looks the same whether the
 /// peer is done or gone, but to one who is gone nothing can be written. So a cut stream is never taken for a
-/// short mesh. A peer that sends nothing for import_idle_timeout, or does not read what it is told for as
-/// long, is not waited for: it would keep others from importing. Progress is written when no write is in
-/// flight, and left out else. Deletes itself.
+/// short mesh. Ids that wait to be read count as an answer, no longer as an import. A peer that sends nothing
+/// for import_idle_timeout, or does not read what it is told for as long, is not waited for: it would keep
+/// others from importing. Progress is written when no write is in flight, and left out else. Deletes itself.
 class ImportReactor final : public grpc::ServerBidiReactor<v1::ImportMeshRequest, v1::ImportMeshResponse>,
                             public ImportMonitor {
  public:
   ImportReactor(const ServiceContext& services, grpc::CallbackServerContext* context)
-      : services_(services), context_(context) {}
+      : services_(services), context_(context), lease_(services.registry.answer_budget()) {}
 
   ImportReactor* Start();
 
@@ -65,7 +65,6 @@ class ImportReactor final : public grpc::ServerBidiReactor<v1::ImportMeshRequest
   bool TakeIds();
   /// Writes the next ids; after the last, the result.
   void WriteIds() ABSL_LOCKS_EXCLUDED(mu_);
-  void EndAnswer(const absl::Status& status);
   void WriteProgress(const char* phase, uint64_t done, uint64_t total) ABSL_LOCKS_EXCLUDED(mu_);
   /// Ends the call, after the write that is in flight. Called once.
   void EndWith(const absl::Status& status) ABSL_LOCKS_EXCLUDED(mu_);
@@ -79,6 +78,7 @@ class ImportReactor final : public grpc::ServerBidiReactor<v1::ImportMeshRequest
   uint64_t next_report_ = 0;  ///< items received at which progress is due
   v1::ImportMeshRequest request_;
   ImportAnswer answer_;
+  Lease lease_;       ///< of the daemon's max_answer_bytes: the ids that wait to be read
   int ids_kind_ = 0;  ///< of the ids to be told next
   size_t ids_next_ = 0;
   v1::ImportMeshResponse progress_;

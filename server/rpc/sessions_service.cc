@@ -41,12 +41,12 @@ absl::Status GetSession(const Session& session, v1::GetSessionResponse* response
   return absl::OkStatus();
 }
 
-absl::Status UpdateSession(Session& session, const v1::UpdateSessionRequest& request,
+absl::Status UpdateSession(Session& session, const v1::UpdateSessionRequest& request, const StopSignal& stop,
                            v1::UpdateSessionResponse* response) {
   DYNMESH_RETURN_IF_ERROR(CheckUpdateMask(request.update_mask()));
   DYNMESH_ASSIGN_OR_RETURN(const std::vector<Relation> wanted,
                            ToStoredRelations(request.session().settings()));
-  DYNMESH_RETURN_IF_ERROR(session.StoreRelations(wanted, request.session().etag()));
+  DYNMESH_RETURN_IF_ERROR(session.StoreRelations(wanted, request.session().etag(), stop));
   DYNMESH_ASSIGN_OR_RETURN(const SessionInfo info, session.Info());
   *response->mutable_session() = FromSessionInfo(info);
   response->set_revision(info.revision);
@@ -207,8 +207,8 @@ class SessionsService final : public v1::SessionService::CallbackService {
                                           v1::UpdateSessionResponse* response) override {
     return RunOnSession({"UpdateSession", context, services_}, request->session().name(),
                         {AccessMode::kWrite, /*heavy=*/true},
-                        [request, response](const SessionPtr& session, AccessGrant) {
-                          return dynmesh::UpdateSession(*session, *request, response);
+                        [context, request, response](const SessionPtr& session, AccessGrant) {
+                          return dynmesh::UpdateSession(*session, *request, CallStop(context), response);
                         });
   }
 

@@ -41,7 +41,7 @@ struct Limits {
   uint32_t max_concurrent_imports = 4;
   /// What imports have received and not built yet, all together.
   uint64_t max_staged_bytes = DefaultMaxSessionBytes();
-  /// How long an import may send nothing.
+  /// How long an import may send nothing, or leave unread what it is told.
   absl::Duration import_idle_timeout = absl::Seconds(60);
   /// Calls that wait for a thread or for their session, and the bytes of their requests; for each of the two
   /// pools of threads.

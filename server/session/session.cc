@@ -208,10 +208,13 @@ absl::Status Session::CheckMemory(absl::Span<const Edit> edits) {
   if (bytes > limits().max_session_bytes) {
     return LimitExceeded("max_session_bytes", limits().max_session_bytes, bytes);
   }
-  // An index can be made again; an edit that is refused cannot.
-  if (bytes + spatial_.memory_bytes() > limits().max_session_bytes) spatial_.Clear();
+  MakeRoom(bytes);
   items_since_check_ = 0;
   return absl::OkStatus();
+}
+
+void Session::MakeRoom(uint64_t mesh_bytes) {
+  if (mesh_bytes + spatial_.memory_bytes() > limits().max_session_bytes) spatial_.Clear();
 }
 
 Session::AnswerPtr Session::Unchanged() const {
@@ -228,11 +231,15 @@ void Session::Committed() {
   for (EntityKind kind : kEntityKinds) num_live_[Dimension(kind)].store(mesh_.NumLive(kind));
 }
 
-absl::Status Session::StoreRelations(absl::Span<const Relation> wanted, absl::string_view etag) {
+absl::Status Session::StoreRelations(absl::Span<const Relation> wanted, absl::string_view etag,
+                                     const StopSignal& stop) {
   WriterMutexLock lock(&mu_);
   DYNMESH_RETURN_IF_ERROR(gone_);
   DYNMESH_RETURN_IF_ERROR(CheckEtag(etag));
-  return StoreJust(mesh_, wanted, limits().max_session_bytes);
+  DYNMESH_RETURN_IF_ERROR(StoreJust(mesh_, wanted, limits().max_session_bytes, stop));
+  MakeRoom(mesh_.memory_bytes());
+  ++num_updates_;
+  return absl::OkStatus();
 }
 
 absl::Status Session::CheckEmpty() const {
@@ -246,6 +253,7 @@ absl::Status Session::Adopt(Mesh& mesh) {
     DYNMESH_RETURN_IF_ERROR(gone_);
     DYNMESH_RETURN_IF_ERROR(CheckEmpty());
     DYNMESH_RETURN_IF_ERROR(StoreJust(mesh, StoredRelationsOf(mesh_), limits().max_session_bytes));
+    MakeRoom(mesh.memory_bytes());
     std::swap(mesh_, mesh);
     Committed();
   }
@@ -281,6 +289,8 @@ absl::Status Session::CheckEtag(absl::string_view etag) const {
   return etag.empty() || etag == present ? absl::OkStatus() : EtagMismatch(name(), present);
 }
 
-std::string Session::EtagAt(int64_t revision) const { return absl::StrCat(uid_, "-", revision); }
+std::string Session::EtagAt(int64_t revision) const {
+  return absl::StrCat(uid_, "-", revision, "-", num_updates_.load());
+}
 
 }  // namespace dynmesh

@@ -125,8 +125,8 @@ class Session : public std::enable_shared_from_this<Session> {
 
   /// Stores just the relations of `wanted`; no revision is made. All or nothing. Takes the writer lock for as
   /// long as that takes. Errors: those of StoreJust; ABORTED ETAG_MISMATCH (an empty `etag` fits any).
-  absl::Status StoreRelations(absl::Span<const Relation> wanted, absl::string_view etag)
-      ABSL_LOCKS_EXCLUDED(mu_);
+  absl::Status StoreRelations(absl::Span<const Relation> wanted, absl::string_view etag,
+                              const StopSignal& stop = StopSignal::Never()) ABSL_LOCKS_EXCLUDED(mu_);
 
   /// FAILED_PRECONDITION SESSION_NOT_EMPTY unless the session is at revision 0. Never waits.
   absl::Status CheckEmpty() const;
@@ -159,6 +159,8 @@ class Session : public std::enable_shared_from_this<Session> {
   absl::StatusOr<AnswerPtr> ApplyOnce(absl::Span<const Edit> edits, const ApplyOptions& options,
                                       uint64_t fingerprint) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
   absl::Status CheckMemory(absl::Span<const Edit> edits) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
+  /// An index can be made again: it goes when the mesh needs its room.
+  void MakeRoom(uint64_t mesh_bytes) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
   AnswerPtr Unchanged() const ABSL_SHARED_LOCKS_REQUIRED(mu_);
   void Committed() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
 
@@ -174,6 +176,7 @@ class Session : public std::enable_shared_from_this<Session> {
   uint64_t items_since_check_ ABSL_GUARDED_BY(mu_) = 0;
   AnswerMemory<BatchResult> answers_ ABSL_GUARDED_BY(mu_);
   std::atomic<int64_t> revision_{0};
+  std::atomic<uint64_t> num_updates_{0};  ///< of settings
   std::array<std::atomic<uint32_t>, kNumEntityKinds> num_live_ = {};
 
   mutable Mutex imports_mu_;

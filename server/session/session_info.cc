@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/mesh/error.h"
+#include "server/session/catch_exceptions.h"
 
 namespace dynmesh {
 namespace {
@@ -23,16 +24,31 @@ bool Contains(absl::Span<const Relation> relations, Relation relation) {
   return std::find(relations.begin(), relations.end(), relation) != relations.end();
 }
 
+/// Lets tables be made as long as the mesh stays within its limit and somebody waits for them.
+class StoreMeter final : public WorkMeter {
+ public:
+  StoreMeter(uint64_t used_bytes, uint64_t max_bytes, const StopSignal& stop)
+      : bytes_(used_bytes), max_bytes_(max_bytes), stop_(stop) {}
+
+  absl::Status ChargeSteps(uint64_t) override { return stop_.Check(); }
+  absl::Status ChargeBytes(uint64_t bytes) override {
+    bytes_ += bytes;
+    return bytes_ <= max_bytes_ ? absl::OkStatus() : LimitExceeded("max_session_bytes", max_bytes_, bytes_);
+  }
+
+ private:
+  uint64_t bytes_;
+  const uint64_t max_bytes_;
+  const StopSignal& stop_;
+};
+
 /// Switches on what is wanted and not stored, and tells what that was.
-absl::Status SwitchOn(Mesh& mesh, absl::Span<const Relation> wanted, uint64_t max_bytes,
+absl::Status SwitchOn(Mesh& mesh, absl::Span<const Relation> wanted, StoreMeter& meter,
                       std::vector<Relation>& switched) {
   for (Relation relation : wanted) {
     if (mesh.stored().Has(relation)) continue;
-    DYNMESH_RETURN_IF_ERROR(mesh.StoreRelation(relation, true));
+    DYNMESH_RETURN_IF_ERROR(mesh.StoreRelation(relation, true, meter));
     switched.push_back(relation);
-    if (mesh.memory_bytes() > max_bytes) {
-      return LimitExceeded("max_session_bytes", max_bytes, mesh.memory_bytes());
-    }
   }
   return absl::OkStatus();
 }
@@ -63,9 +79,11 @@ std::vector<Relation> StoredRelationsOf(const Mesh& mesh) {
   return stored;
 }
 
-absl::Status StoreJust(Mesh& mesh, absl::Span<const Relation> wanted, uint64_t max_bytes) {
+absl::Status StoreJust(Mesh& mesh, absl::Span<const Relation> wanted, uint64_t max_bytes,
+                       const StopSignal& stop) {
   std::vector<Relation> switched;
-  const absl::Status status = SwitchOn(mesh, wanted, max_bytes, switched);
+  StoreMeter meter(mesh.memory_bytes(), max_bytes, stop);
+  const absl::Status status = CatchExceptions([&] { return SwitchOn(mesh, wanted, meter, switched); });
   for (Relation relation : status.ok() ? StoredRelationsOf(mesh) : switched) {
     // Switching off cannot fail.
     if (!status.ok() || !Contains(wanted, relation)) mesh.StoreRelation(relation, false).IgnoreError();

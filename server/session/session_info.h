@@ -15,6 +15,7 @@
 #include "core/mesh/estimate.h"
 #include "core/mesh/mesh.h"
 #include "server/session/mutex.h"
+#include "server/session/stop_signal.h"
 
 namespace dynmesh {
 
@@ -37,8 +38,10 @@ std::vector<Relation> StoredRelationsOf(const Mesh& mesh);
 
 /// Makes `mesh` store just those of `wanted`; on failure it stores what it did before.
 /// Errors: INVALID_ARGUMENT unless all are storable; RESOURCE_EXHAUSTED, also LIMIT_EXCEEDED
-/// (max_session_bytes) when the mesh would take more than `max_bytes`. Cost: all rows of each new relation.
-absl::Status StoreJust(Mesh& mesh, absl::Span<const Relation> wanted, uint64_t max_bytes);
+/// (max_session_bytes) when the mesh would take more than `max_bytes`; what `stop` says. Cost: all rows of
+/// each new relation.
+absl::Status StoreJust(Mesh& mesh, absl::Span<const Relation> wanted, uint64_t max_bytes,
+                       const StopSignal& stop = StopSignal::Never());
 
 /// What a session is and holds at one revision.
 struct SessionInfo {

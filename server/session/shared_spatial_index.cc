@@ -1,5 +1,7 @@
 #include "server/session/shared_spatial_index.h"
 
+#include <algorithm>
+
 #include "core/mesh/error.h"
 
 namespace dynmesh {
@@ -14,16 +16,23 @@ absl::Status SharedSpatialIndex::Read(const Mesh& mesh, EntityKind kind, WorkMet
 
 absl::Status SharedSpatialIndex::CatchUp(const Mesh& mesh, WorkMeter& meter, OfKind& own) {
   WriterMutexLock lock(&own.mu);
-  if (own.index.revision() < 0) DYNMESH_RETURN_IF_ERROR(CheckRoom(mesh, own.index.kind()));
-  const absl::Status caught_up = own.index.CatchUp(mesh, meter);
+  DYNMESH_RETURN_IF_ERROR(CheckRoom(mesh, own));
+  absl::Status caught_up = own.index.CatchUp(mesh, meter);
+  if (caught_up.ok() &&
+      mesh.memory_bytes() + memory_bytes() - own.bytes.load() + own.index.memory_bytes() > max_bytes_) {
+    own.index = SpatialIndex(own.index.kind());  // one that is packed anew takes less
+    caught_up = own.index.CatchUp(mesh, meter);
+  }
   own.bytes.store(own.index.memory_bytes());
   own.revision.store(own.index.revision());
   return caught_up;
 }
 
-absl::Status SharedSpatialIndex::CheckRoom(const Mesh& mesh, EntityKind kind) const {
-  const uint64_t bytes =
-      mesh.memory_bytes() + memory_bytes() + mesh.NumLive(kind) * uint64_t{SpatialIndex::kTypicalEntryBytes};
+// An index that is there already may grow, too: by the entities that changed.
+absl::Status SharedSpatialIndex::CheckRoom(const Mesh& mesh, const OfKind& own) const {
+  const uint64_t typical = mesh.NumLive(own.index.kind()) * uint64_t{SpatialIndex::kTypicalEntryBytes};
+  const uint64_t grown = std::max(typical, own.bytes.load());
+  const uint64_t bytes = mesh.memory_bytes() + memory_bytes() - own.bytes.load() + grown;
   return bytes <= max_bytes_ ? absl::OkStatus() : LimitExceeded("max_session_bytes", max_bytes_, bytes);
 }
 

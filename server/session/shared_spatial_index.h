@@ -53,7 +53,7 @@ class SharedSpatialIndex {
   };
 
   absl::Status CatchUp(const Mesh& mesh, WorkMeter& meter, OfKind& own);
-  absl::Status CheckRoom(const Mesh& mesh, EntityKind kind) const;
+  absl::Status CheckRoom(const Mesh& mesh, const OfKind& own) const ABSL_SHARED_LOCKS_REQUIRED(own.mu);
 
   const uint64_t max_bytes_;
   std::array<OfKind, kNumEntityKinds> kinds_ = {OfKind(EntityKind::kVertex), OfKind(EntityKind::kEdge),

@@ -143,6 +143,40 @@ TEST_F(ImportRpcTest, HilbertOrderIsToldBeforeTheResultInPieces) {
   }
 }
 
+TEST_F(ImportRpcTest, IdsThatWaitToBeReadKeepNobodyFromImporting) {
+  Limits limits;
+  limits.max_concurrent_imports = 1;
+  StartServer(limits);
+  for (const char* name : {"mesh", "other"}) ASSERT_TRUE(CreateSession(name).ok());
+  v1::ImportMeshRequest head = ImportHead("mesh");
+  head.mutable_header()->set_slot_order(v1::SLOT_ORDER_HILBERT);
+  PatientContext context;
+  const auto stream = sessions().ImportMesh(&context);
+  stream->Write(head);
+  for (int i = 0; i < 30; ++i) stream->Write(ImportPositions(SomePoints(100'000)));  // 12 MB of ids
+  stream->WritesDone();
+  v1::ImportMeshResponse response;
+  while (!response.has_ids()) ASSERT_TRUE(stream->Read(&response));
+  EXPECT_TRUE(Import("other", TetGrid(2, 2, 2)).ok());
+  size_t told = Array<Slot>(response.ids().ids()).size();
+  while (stream->Read(&response)) told += response.ids().ids().size() / sizeof(Slot);
+  EXPECT_TRUE(stream->Finish().ok());
+  EXPECT_EQ(told, 3'000'000u);
+}
+
+TEST_F(ImportRpcTest, IdsCountAsAnAnswerBeforeAnythingIsChanged) {
+  Limits limits;
+  limits.max_answer_bytes = 100'000;
+  StartServer(limits);
+  ASSERT_TRUE(CreateSession("mesh").ok());
+  v1::ImportMeshRequest head = ImportHead("mesh");
+  head.mutable_header()->set_slot_order(v1::SLOT_ORDER_HILBERT);
+  ExpectError(ImportRequests({head, ImportPositions(SomePoints(40'000))}), grpc::RESOURCE_EXHAUSTED,
+              reason::kLimitExceeded, "limit", "max_answer_bytes");
+  ExpectStillEmpty();
+  EXPECT_TRUE(ImportRequests({ImportHead("mesh"), ImportPositions(SomePoints(40'000))}).ok());
+}
+
 TEST_F(ImportRpcTest, AnUnknownSlotOrderIsRefused) {
   v1::ImportMeshRequest head = ImportHead("mesh");
   head.mutable_header()->set_slot_order(static_cast<v1::SlotOrder>(9));

@@ -93,6 +93,53 @@ TEST_F(SessionTest, ASwitchThatIsRefusedChangesNothing) {
   EXPECT_EQ(session->StoreRelations({}, "").code(), absl::StatusCode::kNotFound);
 }
 
+/// Says no after so many questions.
+class StopAfter final : public StopSignal {
+ public:
+  explicit StopAfter(int questions) : questions_(questions) {}
+  absl::Status Check() const override { return --questions_ < 0 ? absl::CancelledError() : absl::OkStatus(); }
+
+ private:
+  mutable int questions_;
+};
+
+TEST_F(SessionTest, ASwitchThatNobodyWaitsForEndsAndChangesNothing) {
+  const SessionPtr session = daemon_.NewSession();
+  Mesh mesh = TetGrid(9, 9, 9);
+  ASSERT_TRUE(session->Adopt(mesh).ok());
+  const Relation first{EntityKind::kCell, EntityKind::kEdge}, second{EntityKind::kCell, EntityKind::kCell};
+  for (int questions : {0, 1, 5, 19}) {
+    const absl::Status stopped = session->StoreRelations({first, second}, "", StopAfter(questions));
+    EXPECT_EQ(stopped.code(), absl::StatusCode::kCancelled) << questions;
+    EXPECT_THAT(session->Info()->settings.stored_relations, IsEmpty());
+  }
+  EXPECT_TRUE(session->StoreRelations({first, second}, "", StopAfter(1000)).ok());
+}
+
+TEST_F(SessionTest, TablesThatWouldNotFitAreRefusedBeforeTheyTakeMemory) {
+  Mesh crowd;  // every tetrahedron on the face is across it from every other
+  AddVertices(crowd, 403);
+  for (Slot apex = 3; apex < 403; ++apex) Add(crowd, ElementType::kTetrahedron, {0, 1, 2, apex});
+  Commit(crowd);
+  const uint64_t bytes = crowd.memory_bytes();
+  Daemon daemon(Limits{.max_session_bytes = bytes + 400 * 399 * sizeof(Slot)});
+  const SessionPtr session = daemon.NewSession();
+  ASSERT_TRUE(session->Adopt(crowd).ok());
+  const Relation cells{EntityKind::kCell, EntityKind::kCell};
+  EXPECT_EQ(RefusalOf(session->StoreRelations({cells}, "")),
+            (Refusal{absl::StatusCode::kResourceExhausted, reason::kLimitExceeded}));
+  EXPECT_EQ(session->Info()->memory_bytes, bytes);
+}
+
+TEST_F(SessionTest, AnUpdateChangesTheEtag) {
+  const SessionPtr session = daemon_.NewSession();
+  const std::string before = session->Info()->etag;
+  ASSERT_TRUE(session->StoreRelations({kStorableRelations[0]}, before).ok());
+  EXPECT_NE(session->Info()->etag, before);
+  ExpectRefused(*session, absl::StatusCode::kAborted, reason::kEtagMismatch,
+                [&] { return session->StoreRelations({kStorableRelations[1]}, before); });
+}
+
 TEST_F(SessionTest, ABatchWithoutEditsAnswersWithTheCurrentState) {
   const SessionPtr session = daemon_.NewSession();
   MustApply(*session, AddTet());

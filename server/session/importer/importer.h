@@ -90,6 +90,10 @@ class Importer {
   /// Where pieces go.
   StagedMesh& staged() { return staged_; }
   uint64_t num_received() const { return staged_.num_vertices() + staged_.num_elements(); }
+  /// Bytes of ImportAnswer::slots.
+  uint64_t num_slot_bytes() const {
+    return options_.slot_order == SlotOrder::kCaller ? 0 : num_received() * sizeof(Slot);
+  }
   uint64_t num_announced() const { return options_.num_vertices + options_.num_elements; }
 
   /// Errors: INVALID_ARGUMENT COUNT_MISMATCH and those of MeshBuilder; FAILED_PRECONDITION SESSION_NOT_EMPTY
