@@ -30,8 +30,8 @@ from .v1 import queries_pb2, queries_pb2_grpc
 class PlaceReader:
     """Asks one session about places. Its server makes an index of what is asked about, and keeps it current.
 
-    Answers hold where coordinates, and the differences between them, are 0 or from 1e-140 to 1e140 in absolute
-    value. Beyond that rays may miss what they meet.
+    Answers hold where coordinates, and the differences between them, are 0 or from 1e-140 to 1e140 in
+    absolute value. Beyond that rays may miss what they meet.
     """
 
     name: str
