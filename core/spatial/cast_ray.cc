@@ -15,6 +15,9 @@ namespace dynmesh {
 namespace {
 
 constexpr double kMaxPieces = 256;
+// What a piece takes that meets nothing, and a test of a triangle, next to looking at an entry.
+constexpr uint64_t kStepsPerPiece = 10;
+constexpr uint64_t kStepsPerTriangle = 10;
 
 /// About as many pieces as a ray crosses entities in a solid of so many.
 int NumPieces(size_t num_entries) {
@@ -25,11 +28,11 @@ bool Before(const RayHit& a, const RayHit& b) { return std::pair(a.t, a.face) < 
 
 class RayCaster {
  public:
-  RayCaster(const Mesh& mesh, const SpatialIndex& index, RayTargets targets, WorkMeter& meter)
-      : mesh_(mesh), index_(index), targets_(targets), meter_(meter) {}
+  RayCaster(const Mesh& mesh, const SpatialIndex& index, const RayOptions& options, WorkMeter& meter)
+      : mesh_(mesh), index_(index), options_(options), meter_(meter) {}
 
   /// Collects hits of the whole ray, or until one is certain to be the first.
-  absl::Status Run(const RayShear& shear, RayHits wanted) {
+  absl::Status Run(const RayShear& shear) {
     if (!index_.bounds().has_value()) return absl::OkStatus();
     const auto range = shear.Clip(*index_.bounds());
     if (!range.has_value()) return absl::OkStatus();
@@ -39,7 +42,7 @@ class RayCaster {
     for (int i = 1; i <= pieces; ++i) {
       const double end = i == pieces ? last : first + (last - first) * i / pieces;
       DYNMESH_RETURN_IF_ERROR(RunPiece(shear, begin, end));
-      if (wanted == RayHits::kFirst && !hits_.empty() && KeepFirst() <= end) break;
+      if (options_.hits == RayHits::kFirst && !hits_.empty() && hits_.front().t <= end) break;
       begin = end;
     }
     return absl::OkStatus();
@@ -57,6 +60,7 @@ class RayCaster {
   absl::Status RunPiece(const RayShear& shear, double begin, double end) {
     const Box box = shear.Cover(begin, end);
     const FloatBox image = index_.frame().Round(box);
+    DYNMESH_RETURN_IF_ERROR(meter_.ChargeSteps(kStepsPerPiece));
     DYNMESH_RETURN_IF_ERROR(index_.ForEachNear(box, meter_, [&](const SpatialIndex::Entry& entry) {
       // As the ray never turns round, what meets any earlier piece as well meets the last one.
       if (last_image_.has_value() && Meet(entry.box, *last_image_)) return absl::OkStatus();
@@ -71,13 +75,24 @@ class RayCaster {
     const auto vertices = mesh_.Vertices(f);
     absl::optional<double> before;
     for (size_t k = 2; k < vertices.size(); ++k) {
+      DYNMESH_RETURN_IF_ERROR(meter_.ChargeSteps(kStepsPerTriangle));
       const auto t = shear.Hit(
           {mesh_.Position(vertices[0]), mesh_.Position(vertices[k - 1]), mesh_.Position(vertices[k])});
       if (!t.has_value() || IsOnDiagonal(before, *t)) continue;
-      DYNMESH_RETURN_IF_ERROR(meter_.ChargeBytes(sizeof(RayHit)));
-      hits_.push_back({f, *t});
+      DYNMESH_RETURN_IF_ERROR(Add({f, *t}));
       before = t;
     }
+    return absl::OkStatus();
+  }
+
+  /// Keeps a hit; where the first is wanted, only that of them all.
+  absl::Status Add(const RayHit& hit) {
+    if (options_.hits == RayHits::kFirst && !hits_.empty()) {
+      hits_.front() = std::min(hits_.front(), hit, Before);
+      return absl::OkStatus();
+    }
+    DYNMESH_RETURN_IF_ERROR(meter_.ChargeBytes(sizeof(RayHit)));
+    hits_.push_back(hit);
     return absl::OkStatus();
   }
 
@@ -87,20 +102,13 @@ class RayCaster {
   }
 
   bool IsTarget(FaceId f) const {
-    return targets_ == RayTargets::kAnyFace || mesh_.IsOnBoundary(f) ||
+    return options_.targets == RayTargets::kAnyFace || mesh_.IsOnBoundary(f) ||
            (mesh_.IsElement(f) && !mesh_.IsDuplicate(f));
-  }
-
-  /// Drops all but the first hit; returns its t.
-  double KeepFirst() {
-    hits_.front() = *std::min_element(hits_.begin(), hits_.end(), Before);
-    hits_.resize(1);
-    return hits_.front().t;
   }
 
   const Mesh& mesh_;
   const SpatialIndex& index_;
-  const RayTargets targets_;
+  const RayOptions options_;
   WorkMeter& meter_;
   absl::optional<FloatBox> last_image_;
   std::vector<RayHit> hits_;
@@ -110,10 +118,9 @@ class RayCaster {
 
 absl::StatusOr<std::vector<RayHit>> SpatialSearch::CastRay(const Ray& ray, const RayOptions& options) {
   const RayShear shear(ray);
-  RayCaster caster(mesh_, index_, options.targets, meter_);
-  DYNMESH_RETURN_IF_ERROR(caster.Run(shear, options.hits));
+  RayCaster caster(mesh_, index_, options, meter_);
+  DYNMESH_RETURN_IF_ERROR(caster.Run(shear));
   std::vector<RayHit> hits = std::move(caster).Take();
-  if (options.hits == RayHits::kFirst && hits.size() > 1) hits.resize(1);
   for (RayHit& hit : hits) hit.t = shear.ToRay(hit.t);
   return hits;
 }

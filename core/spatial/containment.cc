@@ -47,6 +47,12 @@ TetPlace PlaceIn(const std::array<Point, 4>& tet, const Point& p) {
   return {place, sign};
 }
 
+double LargestOf(const Point& p) { return std::max({std::abs(p[0]), std::abs(p[1]), std::abs(p[2])}); }
+
+void Scale(int exponent, Point& p) {
+  for (double& x : p) x = std::ldexp(x, -exponent);
+}
+
 /// A cell's corners and the point, scaled by a power of two.
 struct LocalCell {
   std::array<Point, kMaxElementVertices> corners;
@@ -61,13 +67,6 @@ struct LocalCell {
     const int exponent = std::ilogb(largest) + 1;
     Scale(exponent, point);
     for (int i = 0; i < size; ++i) Scale(exponent, corners[i]);
-  }
-
-  static double LargestOf(const Point& p) {
-    return std::max({std::abs(p[0]), std::abs(p[1]), std::abs(p[2])});
-  }
-  static void Scale(int exponent, Point& p) {
-    for (double& x : p) x = std::ldexp(x, -exponent);
   }
 
   Point Centroid() const {
@@ -104,6 +103,30 @@ bool IsEnclosed(const Mesh& mesh, CellId c, const LocalCell& cell) {
   return winding != 0;
 }
 
+/// A face's corners and the point, scaled by a power of two where their fourth powers might overflow or
+/// vanish.
+struct LocalFacePoints {
+  std::array<Point, 4> corners;
+  size_t size = 0;
+  Point point;
+  int exponent = 0;
+
+  LocalFacePoints(const Mesh& mesh, FaceId f, const Point& p) : point(p) {
+    double largest = LargestOf(p);
+    for (VertexId v : mesh.Vertices(f)) {
+      corners[size] = mesh.Position(v);
+      largest = std::max(largest, LargestOf(corners[size++]));
+    }
+    if (largest == 0 || std::abs(std::ilogb(largest)) <= kHarmless) return;
+    exponent = std::ilogb(largest) + 1;
+    Scale(exponent, point);
+    for (size_t i = 0; i < size; ++i) Scale(exponent, corners[i]);
+  }
+
+ private:
+  static constexpr int kHarmless = 100;
+};
+
 double DistanceToSegment(const Point& a, const Point& b, const Point& p) {
   const Point along = b - a;
   const double length2 = Dot(along, along);
@@ -114,7 +137,7 @@ double DistanceToSegment(const Point& a, const Point& b, const Point& p) {
 
 double DistanceToTriangle(const std::array<Point, 3>& corners, const Point& p) {
   const Point normal = Cross(corners[1] - corners[0], corners[2] - corners[0]);
-  const double length = std::sqrt(Dot(normal, normal));
+  const double length = std::hypot(normal[0], normal[1], normal[2]);
   bool above = length > 0;
   double distance = std::numeric_limits<double>::infinity();
   for (int i = 0; i < 3; ++i) {
@@ -135,15 +158,13 @@ bool ContainsPoint(const Mesh& mesh, CellId c, const Point& p) {
 }
 
 double DistanceTo(const Mesh& mesh, FaceId f, const Point& p) {
-  const auto vertices = mesh.Vertices(f);
+  const LocalFacePoints face(mesh, f, p);
   double distance = std::numeric_limits<double>::infinity();
-  for (size_t k = 2; k < vertices.size(); ++k) {
+  for (size_t k = 2; k < face.size; ++k) {
     distance = std::min(
-        distance,
-        DistanceToTriangle(
-            {mesh.Position(vertices[0]), mesh.Position(vertices[k - 1]), mesh.Position(vertices[k])}, p));
+        distance, DistanceToTriangle({face.corners[0], face.corners[k - 1], face.corners[k]}, face.point));
   }
-  return distance;
+  return std::ldexp(distance, face.exponent);
 }
 
 }  // namespace dynmesh

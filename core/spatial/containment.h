@@ -1,9 +1,17 @@
 #ifndef DYNMESH_CORE_SPATIAL_CONTAINMENT_H_
 #define DYNMESH_CORE_SPATIAL_CONTAINMENT_H_
 
+#include <cstdint>
+
 #include "core/mesh/mesh.h"
 
 namespace dynmesh {
+
+/// Steps of a WorkMeter that ContainsPoint takes in a cell of a type, and DistanceTo in a face.
+constexpr uint64_t StepsToContain(ElementType type) {
+  return type == ElementType::kTetrahedron ? 10 : type == ElementType::kHexahedron ? 100 : 60;
+}
+inline constexpr uint64_t kStepsToMeasure = 10;
 
 /// Whether a cell contains a point; its faces belong to it.
 ///
@@ -19,8 +27,9 @@ namespace dynmesh {
 /// is live. Cost: O(1), at most 60 determinants.
 bool ContainsPoint(const Mesh& mesh, CellId c, const Point& p);
 
-/// Distance from a point to a face, whose quads are cut as above. NaN or infinite where that exceeds double
-/// precision. REQUIRES: `f` is live.
+/// Distance from a point to a face, whose quads are cut as above. Infinite where that exceeds double
+/// precision; however large or small the face is, no product within overflows or vanishes.
+/// REQUIRES: `f` is live.
 double DistanceTo(const Mesh& mesh, FaceId f, const Point& p);
 
 }  // namespace dynmesh

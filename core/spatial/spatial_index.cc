@@ -1,8 +1,10 @@
 #include "core/spatial/spatial_index.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "core/mesh/error.h"
+#include "core/spatial/face_tolerance.h"
 
 namespace dynmesh {
 namespace {
@@ -10,6 +12,10 @@ namespace {
 // Packing an entity takes about an eighth of the time that entering it does.
 constexpr size_t kPackedPerEntered = 8;
 constexpr size_t kFewEntries = 1024;
+// A tree that was packed for so much less is packed anew.
+constexpr size_t kMaxGrowth = 2;
+constexpr double kMaxStretch = 4;
+constexpr Slot kFrameSample = 1024;
 
 /// Which live entities of a kind may lie elsewhere than at a revision before.
 class ChangeScan {
@@ -116,6 +122,32 @@ absl::Status ForEachLive(const BitSet& live, WorkMeter& meter, Fn fn) {
   }
 }
 
+double LongestSide(const Box& box) {
+  double longest = 0;
+  for (int axis = 0; axis < 3; ++axis) longest = std::max(longest, box.high[axis] - box.low[axis]);
+  return longest;
+}
+
+/// A frame in which most boxes keep many bits: one for the middle half of a sample, which a few entities that
+/// lie far away do not sway. REQUIRES: there are live entities, and `bounds` is round them.
+Frame FrameOf(const Mesh& mesh, EntityKind kind, const Box& bounds) {
+  const BitSet& live = mesh.slots(kind).live();
+  std::array<std::vector<double>, 3> places;
+  const Slot stride = static_cast<Slot>(mesh.slots(kind).limit() / kFrameSample + 1);
+  for (Slot next = 0, found; live.Collect(next, &found, 1) > 0;
+       next = std::max(found, next + stride - 1) + 1) {
+    const Box box = BoundsOf(mesh, {kind, found});
+    for (int axis = 0; axis < 3; ++axis) places[axis].push_back(box.low[axis] / 2 + box.high[axis] / 2);
+  }
+  Box middle;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::sort(places[axis].begin(), places[axis].end());
+    middle.low[axis] = places[axis][places[axis].size() / 4];
+    middle.high[axis] = places[axis][places[axis].size() * 3 / 4];
+  }
+  return Frame(middle, bounds);
+}
+
 void Include(const Box& box, absl::optional<Box>& bounds) {
   if (!bounds.has_value()) bounds = box;
   Include(box.low, *bounds);
@@ -132,7 +164,7 @@ absl::Status SpatialIndex::CatchUp(const Mesh& mesh, WorkMeter& meter) {
   DYNMESH_ASSIGN_OR_RETURN(const auto changes,
                            ChangeScan(mesh, kind_, meter).Run(static_cast<Stamp>(revision_), many));
   const bool worn = !changes.has_value() || tree_.size() + changes->size() > 2 * (num_live + kFewEntries);
-  if (worn) return Rebuild(mesh, meter);
+  if (worn || Outgrows(mesh, *changes)) return Rebuild(mesh, meter);
   const int64_t before = std::exchange(revision_, -1);  // a tree that ran out of memory half way is void
   const absl::Status entered = Enter(mesh, *changes, meter);
   revision_ = entered.ok() ? mesh.revision() : before;
@@ -144,9 +176,23 @@ absl::Status SpatialIndex::Enter(const Mesh& mesh, const std::vector<Slot>& slot
     DYNMESH_RETURN_IF_ERROR(meter.ChargeSteps(1));
     const Box box = BoundsOf(mesh, {kind_, slot});
     Include(box, bounds_);
-    tree_.Insert({frame_.Round(box), slot});
+    tree_.Insert(EntryOf(frame_, box, slot));
   }
   return absl::OkStatus();
+}
+
+SpatialIndex::Entry SpatialIndex::EntryOf(const Frame& frame, const Box& box, Slot slot) const {
+  return {frame.Round(kind_ == EntityKind::kFace ? WidenByTolerance(box) : box), slot};
+}
+
+/// Whether the mesh with `slots` is much more than when the tree was packed, or reaches much farther. As the
+/// bounds never shrink between packings, that cannot be had again and again by moving to and fro.
+bool SpatialIndex::Outgrows(const Mesh& mesh, const std::vector<Slot>& slots) const {
+  if (mesh.NumLive(kind_) > kMaxGrowth * num_packed_) return true;
+  absl::optional<Box> bounds = bounds_;
+  for (Slot slot : slots) Include(BoundsOf(mesh, {kind_, slot}), bounds);
+  return bounds.has_value() && packed_bounds_.has_value() &&
+         LongestSide(*bounds) / kMaxStretch > LongestSide(*packed_bounds_);
 }
 
 absl::Status SpatialIndex::Rebuild(const Mesh& mesh, WorkMeter& meter) {
@@ -155,16 +201,18 @@ absl::Status SpatialIndex::Rebuild(const Mesh& mesh, WorkMeter& meter) {
   DYNMESH_RETURN_IF_ERROR(ForEachLive(live, meter, [&](Slot slot) {
     Include(BoundsOf(mesh, {kind_, slot}), bounds);
   }));
-  const Frame frame = bounds.has_value() ? Frame(*bounds) : Frame();
+  const Frame frame = bounds.has_value() ? FrameOf(mesh, kind_, *bounds) : Frame();
   std::vector<Entry> entries;
   entries.reserve(live.size());
   DYNMESH_RETURN_IF_ERROR(ForEachLive(live, meter, [&](Slot slot) {
-    entries.push_back({frame.Round(BoundsOf(mesh, {kind_, slot})), slot});
+    entries.push_back(EntryOf(frame, BoundsOf(mesh, {kind_, slot}), slot));
   }));
   revision_ = -1;  // until the tree is there: memory may run out
   tree_.Build(entries);
   frame_ = frame;
-  bounds_ = bounds;
+  bounds_ = packed_bounds_ = bounds;
+  num_packed_ = mesh.NumLive(kind_);
+  ++num_packings_;
   revision_ = mesh.revision();
   return absl::OkStatus();
 }

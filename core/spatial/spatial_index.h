@@ -25,9 +25,11 @@ namespace dynmesh {
 ///
 /// What changed is read off the mesh's stamps: slots born since the last time, and what is incident to
 /// vertices that moved. These are entered once more, and what stood there before stays as a void entry: the
-/// tree only suggests, and SpatialSearch asks the mesh itself. When many entities changed, or half of the
-/// entries are void, the tree is packed anew, so an edit costs O(log n) amortised.
-/// Memory: about 35 bytes an entry; twice as much again while it is packed. Cost of packing: O(n log n).
+/// tree only suggests, and SpatialSearch asks the mesh itself. When many entities changed, half of the
+/// entries are void, or the mesh is much more than it was or reaches much farther, the tree is packed anew,
+/// so an edit costs O(log n) amortised. Boxes of faces are entered wider than they are (face_tolerance.h).
+/// Memory: about 35 bytes an entry that was packed, up to some 220 one that was entered since; twice as much
+/// again while it is packed. Cost of packing: O(n log n).
 /// Thread safety: that of std::vector.
 class SpatialIndex {
  public:
@@ -42,6 +44,8 @@ class SpatialIndex {
   /// That of the mesh when this caught up with it; -1: it holds nothing.
   int64_t revision() const { return revision_; }
   size_t num_entries() const { return tree_.size(); }
+  /// How often it was packed.
+  uint64_t num_packings() const { return num_packings_; }
   size_t memory_bytes() const { return tree_.memory_bytes(); }
 
   /// Makes this an index of `mesh` at its revision. Each entity or incidence looked at is a step; packing is
@@ -64,11 +68,16 @@ class SpatialIndex {
  private:
   absl::Status Rebuild(const Mesh& mesh, WorkMeter& meter);
   absl::Status Enter(const Mesh& mesh, const std::vector<Slot>& slots, WorkMeter& meter);
+  Entry EntryOf(const Frame& frame, const Box& box, Slot slot) const;
+  bool Outgrows(const Mesh& mesh, const std::vector<Slot>& slots) const;
 
   EntityKind kind_;
   int64_t revision_ = -1;
   Frame frame_;
   absl::optional<Box> bounds_;
+  absl::optional<Box> packed_bounds_;  ///< when the tree was packed
+  size_t num_packed_ = 0;              ///< live entities then
+  uint64_t num_packings_ = 0;
   BoxTree tree_;
 };
 

@@ -5,17 +5,10 @@
 #include "core/mesh/bit_set.h"
 #include "core/mesh/error.h"
 #include "core/spatial/containment.h"
-#include "core/spatial/vector.h"
+#include "core/spatial/face_tolerance.h"
 
 namespace dynmesh {
 namespace {
-
-constexpr double kRelativeTolerance = 1e-9;
-
-double DiagonalOf(const Box& box) {
-  const Point diagonal = box.high - box.low;
-  return std::sqrt(Dot(diagonal, diagonal));
-}
 
 Box Widen(const Point& point, double by) {
   Box box;
@@ -45,30 +38,30 @@ absl::StatusOr<std::vector<Slot>> SpatialSearch::InBox(const Box& box) {
 
 absl::StatusOr<CellId> SpatialSearch::FindCell(const Point& point) {
   CellId lowest;  // an invalid id is higher than all
-  DYNMESH_RETURN_IF_ERROR(index_.ForEachNear({point, point}, meter_, [&](const SpatialIndex::Entry& entry) {
+  const auto visit = [&](const SpatialIndex::Entry& entry) {
     const CellId c(entry.slot);
-    if (c < lowest && mesh_.IsLive(c) && Contains(BoundsOf(mesh_, c), point) &&
-        ContainsPoint(mesh_, c, point)) {
-      lowest = c;
-    }
+    if (!(c < lowest) || !mesh_.IsLive(c) || !Contains(BoundsOf(mesh_, c), point)) return absl::OkStatus();
+    DYNMESH_RETURN_IF_ERROR(meter_.ChargeSteps(StepsToContain(mesh_.Type(c))));
+    if (ContainsPoint(mesh_, c, point)) lowest = c;
     return absl::OkStatus();
-  }));
+  };
+  DYNMESH_RETURN_IF_ERROR(index_.ForEachNear({point, point}, meter_, visit));
   return lowest;
 }
 
 absl::StatusOr<FaceId> SpatialSearch::FindFace(const Point& point, double tolerance) {
   FaceId lowest;
-  if (!index_.bounds().has_value()) return lowest;
-  const double reach = tolerance > 0 ? tolerance : kRelativeTolerance * DiagonalOf(*index_.bounds());
   const auto visit = [&](const SpatialIndex::Entry& entry) {
     const FaceId f(entry.slot);
-    if (f < lowest && mesh_.IsLive(f)) {
-      const double limit = tolerance > 0 ? tolerance : kRelativeTolerance * DiagonalOf(BoundsOf(mesh_, f));
-      if (DistanceTo(mesh_, f, point) <= limit) lowest = f;
-    }
+    if (!(f < lowest) || !mesh_.IsLive(f)) return absl::OkStatus();
+    DYNMESH_RETURN_IF_ERROR(meter_.ChargeSteps(kStepsToMeasure));
+    const double limit = tolerance > 0 ? tolerance : FaceTolerance(BoundsOf(mesh_, f));
+    if (DistanceTo(mesh_, f, point) <= limit) lowest = f;
     return absl::OkStatus();
   };
-  DYNMESH_RETURN_IF_ERROR(index_.ForEachNear(Widen(point, reach), meter_, visit));
+  // Without a tolerance the boxes in the index are as wide as they have to be.
+  const Box near = tolerance > 0 ? Widen(point, tolerance) : Box{point, point};
+  DYNMESH_RETURN_IF_ERROR(index_.ForEachNear(near, meter_, visit));
   return lowest;
 }
 

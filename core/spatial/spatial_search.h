@@ -36,10 +36,10 @@ struct RayOptions {
 
 /// Answers to questions about places, by way of an index, exactly: the index suggests, the mesh decides.
 ///
-/// Everything that is looked at is charged as steps, results as bytes; so among a million boxes on one spot a
-/// search still ends when it is told to. Errors: the meter's.
-/// Arguments must be finite. REQUIRES: the index has caught up with the mesh's revision.
-/// Thread safety: that of std::vector; many may search with one index.
+/// Everything that is looked at is charged as steps, geometric tests as some more, results as bytes; so among
+/// a million boxes on one spot a search still ends when it is told to. Errors: the meter's. Arguments must be
+/// finite. REQUIRES: the index has caught up with the mesh's revision. Thread safety: that of std::vector;
+/// many may search with one index.
 class SpatialSearch {
  public:
   SpatialSearch(const Mesh& mesh, const SpatialIndex& index, WorkMeter& meter)
@@ -63,8 +63,9 @@ class SpatialSearch {
 
   /// Where a ray hits faces, by ascending t, then by id. Quads are two triangles, cut along the diagonal of
   /// their first vertex; one that is warped may be hit twice. A ray through an edge or a vertex hits all
-  /// faces there; faces that it lies in are not hit. Coordinates of 1e150 and more may go unseen. REQUIRES:
-  /// an index of faces, a direction other than zero.
+  /// faces there; faces that it lies in are not hit. Where coordinates, or differences between them, are
+  /// above 1e140 or below 1e-140 in absolute value, but not 0, hits may go unseen. REQUIRES: an index of
+  /// faces, a direction other than zero.
   absl::StatusOr<std::vector<RayHit>> CastRay(const Ray& ray, const RayOptions& options);
 
  private:

@@ -8,6 +8,7 @@
 #include "server/rpc/chunk_stream.h"
 #include "server/rpc/convert.h"
 #include "server/rpc/convert_queries.h"
+#include "server/rpc/query_weight.h"
 #include "server/rpc/spatial_reactors.h"
 #include "server/rpc/unary.h"
 #include "server/session/queries.h"
@@ -31,13 +32,14 @@ class GetNeighborsReactor final : public ChunkStreamReactor<v1::GetNeighborsResp
 
  private:
   bool IsHeavy(const Session& session) const override {
-    return IsHeavySelection(request_.selection(), request_.from(), session) || MayReachMany(session);
+    return IsHeavySelection(request_.selection(), request_.from(), session) || HasHeavyRings(session);
   }
 
-  /// Rings of rings may be everything.
-  bool MayReachMany(const Session& session) const {
+  bool HasHeavyRings(const Session& session) const {
     const absl::StatusOr<EntityKind> kind = ToEntityKind(request_.from(), "from");
-    return kind.ok() && request_.rings() > 1 && session.num_live(*kind) > kManyRows;
+    if (!kind.ok()) return false;
+    const uint64_t num_live = session.num_live(*kind);
+    return IsHeavyRingQuery(CountSelected(request_.selection(), num_live), request_.rings(), num_live);
   }
 
   absl::Status Gather(const Session& session, const QueryTerms& terms, AccessGrant&) override {

@@ -1,26 +1,21 @@
 #include "server/rpc/spatial_reactors.h"
 
 #include <algorithm>
+#include <string>
 #include <utility>
 
 #include "core/mesh/error.h"
 #include "server/rpc/chunk_stream.h"
 #include "server/rpc/convert.h"
 #include "server/rpc/convert_spatial.h"
+#include "server/rpc/query_weight.h"
 #include "server/rpc/unary.h"
 #include "server/session/spatial_queries.h"
 
 namespace dynmesh {
 namespace {
 
-// A point takes some microseconds, a ray up to a hundred.
-constexpr size_t kManyPoints = 5'000;
-constexpr size_t kManyRays = 500;
-
-/// Whether looking up a few places may take long.
-bool IsIndexMissing(const Session& session, EntityKind kind) {
-  return !session.spatial().IsCurrent(kind, session.revision()) && session.num_live(kind) > kManyRows;
-}
+uint64_t CountPoints(const std::string& points) { return points.size() / sizeof(Point); }
 
 /// Base of those that answer with a list of ids.
 template <typename Response>
@@ -72,7 +67,7 @@ class FindInBoxReactor final : public IdsReactor<v1::FindInBoxResponse> {
  private:
   bool IsHeavy(const Session& session) const override {
     const absl::StatusOr<EntityKind> kind = ToEntityKind(request_.kind(), "kind");
-    return kind.ok() && session.num_live(*kind) > kManyRows;  // so many may be found
+    return kind.ok() && IsHeavyPlaceQuery(1, session.num_live(*kind));
   }
 
   absl::Status Gather(const Session& session, const QueryTerms& terms, AccessGrant&) override {
@@ -94,9 +89,9 @@ class FindNearestVerticesReactor final : public ScoredReactor<v1::FindNearestVer
 
  private:
   bool IsHeavy(const Session& session) const override {
-    const uint64_t rows = request_.points().size() / sizeof(Point);
+    const uint64_t rows = CountPoints(request_.points());
     const uint64_t found = rows * std::min(request_.count(), kMaxNearest);
-    return found > kManyRows || rows > kManyPoints || IsIndexMissing(session, EntityKind::kVertex);
+    return found > kManyRows || IsHeavyPlaceQuery(rows, session.num_live(EntityKind::kVertex));
   }
 
   absl::Status Gather(const Session& session, const QueryTerms& terms, AccessGrant&) override {
@@ -118,10 +113,7 @@ class LocatePointsReactor final : public IdsReactor<v1::LocatePointsResponse> {
  private:
   bool IsHeavy(const Session& session) const override {
     const absl::StatusOr<EntityKind> kind = ToEntityKind(request_.kind(), "kind");
-    if (!kind.ok()) return false;
-    // A generous tolerance makes candidates of all faces.
-    const bool wide = request_.tolerance() > 0 && session.num_live(*kind) > kManyRows;
-    return wide || request_.points().size() / sizeof(Point) > kManyPoints || IsIndexMissing(session, *kind);
+    return kind.ok() && IsHeavyPlaceQuery(CountPoints(request_.points()), session.num_live(*kind));
   }
 
   absl::Status Gather(const Session& session, const QueryTerms& terms, AccessGrant&) override {
@@ -142,8 +134,7 @@ class CastRaysReactor final : public ScoredReactor<v1::CastRaysResponse> {
 
  private:
   bool IsHeavy(const Session& session) const override {
-    return request_.origins().size() / sizeof(Point) > kManyRays ||
-           IsIndexMissing(session, EntityKind::kFace);
+    return IsHeavyPlaceQuery(CountPoints(request_.origins()), session.num_live(EntityKind::kFace));
   }
 
   absl::Status Gather(const Session& session, const QueryTerms& terms, AccessGrant&) override {

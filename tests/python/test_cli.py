@@ -147,6 +147,28 @@ def test_help_is_there_for_every_command(run):
         assert shown.returncode == 0 and "usage: dynmesh" in shown.stdout
 
 
+def test_help_is_there_for_every_question(run):
+    for question in ("neighbors", "box", "nearest", "locate", "ray"):
+        shown = run("query", question, "--help")
+        assert shown.returncode == 0 and f"usage: dynmesh query {question}" in shown.stdout, shown.stderr
+        misused = run("query", question)
+        assert misused.returncode == 2 and "Traceback" not in misused.stderr and "required" in misused.stderr
+
+
+def test_numbers_may_be_written_in_any_way(run, mesh_file):
+    run("create", "numbers", mesh_file)
+    near = run("query", "nearest", "numbers", "-1e-3", "-0.", "-.0E+1")
+    assert near.stdout == "0 at distance 0.001\n", near.stderr
+    assert run("query", "box", "numbers", "vertex", "-1e-3", "-1.", "-.5", "1e-3", ".5", ".5").stdout == "0\n"
+    assert run("query", "locate", "numbers", "-1E-3", "-1.e0", "0").stdout == "in no cell\n"
+    hit = run("query", "ray", "numbers", "1e-1", "1e-1", "-1.", "-1e-9", "0", "1.")
+    assert hit.stdout.startswith("face "), hit.stderr
+    box = ["--box", "-1e-3", "-1.", "-1e0", "1e-3", "1", "1"]
+    assert run("query", "neighbors", "numbers", "vertex", "cell", *box).returncode == 0
+    assert run("query", "nearest", "numbers", "0", "0", "0", "-1x").returncode == 2
+    run("rm", "numbers")
+
+
 def test_query_asks_about_neighbours_and_places(run, mesh_file):
     run("create", "asked", mesh_file)
 
@@ -163,7 +185,7 @@ def test_query_asks_about_neighbours_and_places(run, mesh_file):
     assert ask("neighbors", "asked", "vertex", "vertex", "--ids", "0", "--rings", "2", "--boundary")[0] == [
         "0: 1 2 3 4"
     ]
-    assert ask("box", "asked", "cell", *corner)[1]["ids"] == [0, 1]
+    assert ask("box", "asked", "cell", *corner)[1] == {"revision": 1, "ids": [0, 1]}
     lines, record = ask("nearest", "asked", "-1", "0", "0", "--count", "2")
     assert lines[0] == "0 at distance 1" and record["distances"] == pytest.approx([1, 2**0.5])
     assert ask("locate", "asked", "0.1", "0.1", "0.1") == (["cell 0"], {"revision": 1, "kind": "cell", "id": 0})

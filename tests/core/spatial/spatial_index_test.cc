@@ -145,7 +145,75 @@ TEST(SpatialIndexTest, AVertexMayMoveFarBeyondWhereTheIndexBegan) {
     SpatialSearch vertices(mesh, indices[0], WorkMeter::Unlimited());
     EXPECT_EQ(vertices.NearestVertices({far, 3, 2}, 2)->front().vertex, VertexId(26));
   }
-  EXPECT_GT(indices[0].num_entries(), 27u) << "it was made anew";
+}
+
+/// Adds a row of vertices at x = first, first + 1, ... in steps of `step`.
+void AddRow(Mesh& mesh, int first, int last, double step) {
+  for (int i = first; i < last; ++i) ASSERT_TRUE(mesh.AddVertex({i * step, 0, 0}).ok());
+  Commit(mesh);
+}
+
+int64_t StepsToFind(const Mesh& mesh, const SpatialIndex& vertices, const Point& place) {
+  CountDown meter(1'000'000);
+  EXPECT_EQ(SpatialSearch(mesh, vertices, meter).InBox({place, place})->size(), 1u);
+  return 1'000'000 - meter.left();
+}
+
+TEST(SpatialIndexTest, WhatBeganEmptyIsPackedForWhatComes) {
+  Mesh mesh;
+  SpatialIndex vertices(EntityKind::kVertex);
+  ASSERT_TRUE(vertices.CatchUp(mesh, WorkMeter::Unlimited()).ok());
+  constexpr double kTiny = 1e-60;  // nothing where no frame is made for it
+  AddRow(mesh, 0, 1000, kTiny);
+  ASSERT_TRUE(vertices.CatchUp(mesh, WorkMeter::Unlimited()).ok());
+  EXPECT_EQ(vertices.num_packings(), 2u);
+  EXPECT_LT(StepsToFind(mesh, vertices, {500 * kTiny, 0, 0}), 100);
+}
+
+TEST(SpatialIndexTest, GrowthToTwiceTheSizePacksAnew) {
+  Mesh mesh;
+  AddRow(mesh, 0, 100, 0);
+  ASSERT_TRUE(mesh.AddVertex({1000, 0, 0}).ok());
+  Commit(mesh);
+  SpatialIndex vertices(EntityKind::kVertex);
+  for (int i = 0; i <= 102; ++i) {
+    ASSERT_TRUE(vertices.CatchUp(mesh, WorkMeter::Unlimited()).ok());
+    EXPECT_EQ(vertices.num_packings(), i < 102 ? 1u : 2u) << i;
+    AddRow(mesh, i, i + 1, 1);
+  }
+}
+
+TEST(SpatialIndexTest, GrowthFarBeyondItsBoundsPacksAnewButOnce) {
+  Mesh mesh = TetGrid(2, 2, 2);
+  SpatialIndex cells(EntityKind::kCell);
+  const auto packings_with = [&](double far) {
+    EXPECT_TRUE(mesh.MoveVertex(VertexId(26), {far, 2, 2}).ok());
+    Commit(mesh);
+    EXPECT_TRUE(cells.CatchUp(mesh, WorkMeter::Unlimited()).ok());
+    return cells.num_packings();
+  };
+  EXPECT_EQ(packings_with(2), 1u);
+  EXPECT_EQ(packings_with(7), 1u);
+  EXPECT_EQ(packings_with(9), 2u);
+  for (int i = 0; i < 10; ++i) {
+    EXPECT_EQ(packings_with(2), 2u);
+    EXPECT_EQ(packings_with(9), 2u);
+  }
+}
+
+TEST(SpatialIndexTest, OneFarAwayTakesNoBitsFromTheOthers) {
+  for (double far : {1e9, 1e20, 1e30}) {
+    Mesh mesh;
+    AddRow(mesh, 0, 10'000, 1);
+    ASSERT_TRUE(mesh.AddVertex({far, far, far}).ok());
+    Commit(mesh);
+    SpatialIndex vertices(EntityKind::kVertex);
+    ASSERT_TRUE(vertices.CatchUp(mesh, WorkMeter::Unlimited()).ok());
+    EXPECT_LT(StepsToFind(mesh, vertices, {5000, 0, 0}), 1000);
+    CountDown meter(1000);
+    EXPECT_EQ(SpatialSearch(mesh, vertices, meter).NearestVertices({5000.2, 0, 0}, 1)->front().vertex,
+              VertexId(5000));
+  }
 }
 
 TEST(SpatialIndexTest, WhatIsInterruptedCanBeTriedAgain) {

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "core/mesh/error.h"
+#include "core/spatial/containment.h"
 #include "tests/core/spatial/places.h"
 #include "tests/support/count_down.h"
 #include "tests/support/meshes.h"
@@ -107,6 +108,95 @@ TEST(SpatialSearchTest, AMillionBoxesOnOneSpotCanBeLeft) {
   });
   ends(
       [&](WorkMeter& meter) { return faces.Search(meter).FindFace(mesh.Position(VertexId(0)), 0).status(); });
+}
+
+TEST(SpatialSearchTest, AFarVertexDoesNotMakeEachFaceACandidate) {
+  Mesh mesh = TetGrid(10, 10, 10);
+  SpatialIndex faces(EntityKind::kFace);
+  ASSERT_TRUE(faces.CatchUp(mesh, WorkMeter::Unlimited()).ok());
+  const auto steps = [&] {
+    CountDown meter(1'000'000);
+    const Point on_no_edge = {5.3, 5.4, 5};
+    EXPECT_EQ(*SpatialSearch(mesh, faces, meter).FindFace(on_no_edge, 0), BruteFindFace(mesh, on_no_edge, 0));
+    return 1'000'000 - meter.left();
+  };
+  const int64_t before = steps();
+  ASSERT_TRUE(mesh.MoveVertex(VertexId(0), {-1e12, 0, 0}).ok());
+  Commit(mesh);
+  ASSERT_TRUE(faces.CatchUp(mesh, WorkMeter::Unlimited()).ok());
+  EXPECT_LT(steps(), 2 * before + 1000);
+}
+
+TEST(SpatialSearchTest, TheIndexHasRoomForTheToleranceOfEachFace) {
+  for (double at : {0.0, 1e6}) {
+    Mesh mesh;
+    for (const auto& [x, y] : {std::pair(0, 0), {100, 0}, {0, 100}, {1, 0}, {0, 1}}) {
+      ASSERT_TRUE(mesh.AddVertex({at + x, at + y, at}).ok());
+    }
+    Add(mesh, ElementType::kTriangle, {0, 1, 2});
+    Add(mesh, ElementType::kTriangle, {0, 3, 4});
+    Commit(mesh);
+    const Searched faces(mesh, EntityKind::kFace);
+    for (double off = -2e-7; off < 2e-7; off += 1.3e-9) {
+      for (const Point& p : {Point{at + 0.2, at + 0.2, at + off}, Point{at + 50, at + off, at}}) {
+        EXPECT_EQ(*faces.Search().FindFace(p, 0), BruteFindFace(mesh, p, 0)) << off;
+      }
+    }
+  }
+}
+
+TEST(SpatialSearchTest, NoScaleMakesAWrongFace) {
+  for (double size : {1e-300, 1e-200, 1e-160, 1e-90, 1e-50, 1e50, 1e90, 1e160, 1e200, 1e300}) {
+    const Mesh mesh = Mapped(HexGrid(2, 2, 2), [&](double x) { return (x - 1) * size; });
+    const Searched faces(mesh, EntityKind::kFace);
+    for (double x : {-0.75, -0.3, 0.2}) {
+      const Point on = {x * size, 0.3 * size, size}, off = {x * size, 0.3 * size, 0.9 * size};
+      const FaceId f = *faces.Search().FindFace(on, 0);
+      ASSERT_TRUE(f.valid()) << size;
+      EXPECT_TRUE(Contains(BoundsOf(mesh, f), on)) << size;
+      EXPECT_FALSE(faces.Search().FindFace(off, 0)->valid()) << size;
+      EXPECT_FALSE(faces.Search().FindFace(off, 0.09 * size)->valid()) << size;
+      EXPECT_TRUE(faces.Search().FindFace(off, 0.11 * size)->valid()) << size;
+    }
+  }
+}
+
+/// How many steps fn(meter) takes.
+template <typename Fn>
+int64_t StepsOf(Fn fn) {
+  CountDown meter(1'000'000);
+  EXPECT_TRUE(fn(meter).ok());
+  return 1'000'000 - meter.left();
+}
+
+TEST(SpatialSearchTest, ATestCostsMoreThanALook) {
+  const Mesh hex = HexGrid(1, 1, 1), tet = OneTet();
+  const Searched hexes(hex, EntityKind::kCell), tets(tet, EntityKind::kCell), faces(hex, EntityKind::kFace);
+  EXPECT_EQ(StepsOf([&](WorkMeter& m) { return hexes.Search(m).FindCell({0.5, 0.5, 0.5}).status(); }), 101);
+  EXPECT_EQ(
+      StepsOf([&](WorkMeter& m) { return tets.Search(m).FindCell(tet.Position(VertexId(0))).status(); }), 11);
+  const auto locate = [&](WorkMeter& m) { return faces.Search(m).FindFace({0.3, 0.4, 1}, 0).status(); };
+  EXPECT_EQ(StepsOf(locate), 6 + kStepsToMeasure);
+  const Ray ray{{0.3, 0.4, -1}, {0, 0, 1}};
+  EXPECT_GE(StepsOf([&](WorkMeter& m) { return faces.Search(m).CastRay(ray, {}).status(); }), 20 + 1);
+}
+
+TEST(SpatialSearchTest, OfManyFacesOnOneSpotTheFirstHitIsOneResult) {
+  Mesh mesh;
+  AddVertices(mesh, 3);
+  for (int i = 0; i < 1000; ++i) Add(mesh, ElementType::kTriangle, {0, 1, 2});
+  Commit(mesh);
+  Point centre = {};
+  for (Slot v = 0; v < 3; ++v) {
+    for (int axis = 0; axis < 3; ++axis) centre[axis] += mesh.Position(VertexId(v))[axis] / 3;
+  }
+  const Ray ray{{centre[0], centre[1], centre[2] - 1}, {0, 0, 1}};
+  const Searched faces(mesh, EntityKind::kFace);
+  CountDown meter(1'000'000);
+  const auto hits = *faces.Search(meter).CastRay(ray, {RayTargets::kAnyFace, RayHits::kFirst});
+  ASSERT_EQ(hits.size(), 1u);
+  EXPECT_EQ(hits[0].face, FaceId(0));
+  EXPECT_EQ(meter.bytes(), sizeof(RayHit));
 }
 
 TEST(SpatialSearchTest, ResultsAreChargedAsBytes) {

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from .session import Session
@@ -13,15 +14,25 @@ Answer = tuple[dict[str, Any], str]
 
 _KINDS = ("vertex", "edge", "face", "cell")
 _BOX = ("X0", "Y0", "Z0", "X1", "Y1", "Z1")
+_POINT = ("X", "Y", "Z")
+_ORIGIN, _DIRECTION = ("OX", "OY", "OZ"), ("DX", "DY", "DZ")
+# argparse takes -1e-3 and -1. for options.
+_NEGATIVE_NUMBER = re.compile(r"-(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$")
 
 
-def add_questions(command: Callable[[str, str], argparse.ArgumentParser]) -> None:
-    """Adds the parsers; ``command(name, help)`` makes one. Each sets ``ask(session, args)``."""
+def add_questions(make: Callable[[str, str], argparse.ArgumentParser]) -> None:
+    """Adds the parsers; ``make(name, help)`` makes one. Each sets ``ask(session, args)``."""
+
+    def command(name: str, help_text: str) -> argparse.ArgumentParser:
+        parser = make(name, help_text)
+        parser._negative_number_matcher = _NEGATIVE_NUMBER
+        return parser
+
     _add_neighbors(command("neighbors", "Neighbours of entities, a line for each."))
     box = command("box", "Entities in a box: vertices inside, others whose bounding box meets it.")
     box.add_argument("name", metavar="NAME")
     box.add_argument("kind", choices=_KINDS)
-    box.add_argument("box", metavar=_BOX, nargs=6, type=float)
+    _add_numbers(box, _BOX)
     box.set_defaults(ask=_box)
     nearest = command("nearest", "The vertices nearest to a point, with distances.")
     _add_point(nearest)
@@ -34,8 +45,7 @@ def add_questions(command: Callable[[str, str], argparse.ArgumentParser]) -> Non
     locate.set_defaults(ask=_locate)
     ray = command("ray", "What a ray hits: faces, with t of origin + t * direction.")
     ray.add_argument("name", metavar="NAME")
-    ray.add_argument("origin", metavar=("OX", "OY", "OZ"), nargs=3, type=float)
-    ray.add_argument("direction", metavar=("DX", "DY", "DZ"), nargs=3, type=float)
+    _add_numbers(ray, _ORIGIN + _DIRECTION)
     ray.add_argument("--all", action="store_true", help="all hits, not only the first")
     ray.add_argument("--any-face", action="store_true", help="inner faces too")
     ray.set_defaults(ask=_ray)
@@ -54,7 +64,17 @@ def _add_neighbors(parser: argparse.ArgumentParser) -> None:
 
 def _add_point(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("name", metavar="NAME")
-    parser.add_argument("point", metavar=("X", "Y", "Z"), nargs=3, type=float)
+    _add_numbers(parser, _POINT)
+
+
+def _add_numbers(parser: argparse.ArgumentParser, names: Sequence[str]) -> None:
+    # One by one: argparse cannot print a positional with several metavars.
+    for name in names:
+        parser.add_argument(name, type=float)
+
+
+def _numbers(args: argparse.Namespace, names: Sequence[str]) -> list[float]:
+    return [getattr(args, name) for name in names]
 
 
 def _neighbors(session: Session, args: argparse.Namespace) -> Answer:
@@ -72,19 +92,20 @@ def _neighbors(session: Session, args: argparse.Namespace) -> Answer:
 
 
 def _box(session: Session, args: argparse.Namespace) -> Answer:
-    ids = session.in_box(args.kind, _corners(args.box)).tolist()
-    return {"ids": ids}, "\n".join(map(str, ids))
+    found, revision = session._in_box(args.kind, _corners(_numbers(args, _BOX)))
+    ids = found.tolist()
+    return {"revision": revision, "ids": ids}, "\n".join(map(str, ids))
 
 
 def _nearest(session: Session, args: argparse.Namespace) -> Answer:
-    found = session.nearest_vertices(args.point, args.count)
+    found = session.nearest_vertices(_numbers(args, _POINT), args.count)
     ids, distances = found.ids.tolist(), found.distances.tolist()
     lines = [f"{vertex} at distance {distance:g}" for vertex, distance in zip(ids, distances)]
     return {"revision": found.revision, "ids": ids, "distances": distances}, "\n".join(lines)
 
 
 def _locate(session: Session, args: argparse.Namespace) -> Answer:
-    found = session.locate(args.point, args.kind, tolerance=args.tolerance)
+    found = session.locate(_numbers(args, _POINT), args.kind, tolerance=args.tolerance)
     entity = int(found.ids[0])
     record = {"revision": found.revision, "kind": args.kind, "id": None if entity < 0 else entity}
     return record, f"in no {args.kind}" if entity < 0 else f"{args.kind} {entity}"
@@ -92,8 +113,8 @@ def _locate(session: Session, args: argparse.Namespace) -> Answer:
 
 def _ray(session: Session, args: argparse.Namespace) -> Answer:
     found = session.cast_rays(
-        args.origin,
-        args.direction,
+        _numbers(args, _ORIGIN),
+        _numbers(args, _DIRECTION),
         hits="all" if args.all else "first",
         targets="any" if args.any_face else "surface",
     )

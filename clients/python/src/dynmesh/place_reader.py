@@ -28,7 +28,11 @@ from .v1 import queries_pb2, queries_pb2_grpc
 
 
 class PlaceReader:
-    """Asks one session about places. Its server makes an index of what is asked about, and keeps it current."""
+    """Asks one session about places. Its server makes an index of what is asked about, and keeps it current.
+
+    Answers hold where coordinates, and the differences between them, are 0 or from 1e-140 to 1e140 in
+    absolute value. Beyond that rays may miss what they meet.
+    """
 
     name: str
     _caller: Caller
@@ -51,6 +55,10 @@ class PlaceReader:
         ResourceExhaustedError
             LIMIT_EXCEEDED, also when there is no room for the index.
         """
+        return self._in_box(kind, box, timeout)[0]
+
+    def _in_box(self, kind: KindLike, box: ArrayLike, timeout: float | None = None) -> tuple[Ids, int]:
+        """Ids, and the revision that they are of."""
         request = queries_pb2.FindInBoxRequest(session=self.name, kind=int(as_kind(kind)), box=box_message(box))
         return read_in_box(self._caller.stream(self._queries.FindInBox, request, timeout))
 

@@ -91,9 +91,10 @@ def ray_options(hits: str, targets: str) -> dict[str, Any]:
     return {"hits": _word(hits, _HITS, "hits"), "targets": _word(targets, _TARGETS, "targets")}
 
 
-def read_in_box(replies: Iterable[queries_pb2.FindInBoxResponse]) -> Ids:
-    """Joins the chunks of an answer."""
-    return joined(list(replies), "ids")
+def read_in_box(replies: Iterable[queries_pb2.FindInBoxResponse]) -> tuple[Ids, int]:
+    """Joins the chunks of an answer: ids and revision."""
+    chunks = list(replies)
+    return joined(chunks, "ids"), revision_of(chunks)
 
 
 def read_nearest(replies: Iterable[queries_pb2.FindNearestVerticesResponse]) -> NearestVertices:
