@@ -19,10 +19,9 @@ struct QueryTerms {
 
 /// What one answer may still cost while it is gathered: bytes of the answer, and steps of the way to it.
 ///
-/// A step is one entity or one entry of an incidence list that is looked at, about ten nanoseconds; a geometric
-/// test counts as many steps as it takes. So a
-/// query takes a time that is bounded whatever the mesh looks like, and never goes on for longer than
-/// kStepsPerCheck steps after nobody wants its answer any more.
+/// A step is one entity or one entry of an incidence list that is looked at, about ten nanoseconds; a
+/// geometric test counts as many steps as it takes. So a query takes a time that is bounded whatever the mesh
+/// looks like, and never goes on for longer than kStepsPerCheck steps after nobody wants its answer any more.
 /// Thread safety: that of std::vector.
 class QueryBudget final : public WorkMeter {
  public:

@@ -211,8 +211,9 @@ TEST(SpatialIndexTest, OneFarAwayTakesNoBitsFromTheOthers) {
     ASSERT_TRUE(vertices.CatchUp(mesh, WorkMeter::Unlimited()).ok());
     EXPECT_LT(StepsToFind(mesh, vertices, {5000, 0, 0}), 1000);
     CountDown meter(1000);
-    EXPECT_EQ(SpatialSearch(mesh, vertices, meter).NearestVertices({5000.2, 0, 0}, 1)->front().vertex,
-              VertexId(5000));
+    const auto nearest = SpatialSearch(mesh, vertices, meter).NearestVertices({5000.2, 0, 0}, 1);
+    ASSERT_TRUE(nearest.ok()) << nearest.status();
+    EXPECT_EQ(nearest->front().vertex, VertexId(5000));
   }
 }
 
