@@ -154,6 +154,20 @@ def test_relations_that_cannot_be_stored_are_refused(session):
     assert session.info().stored_relations == {}
 
 
+def test_an_update_is_repeated_only_without_an_etag(session, monkeypatch):
+    unary, repeatable = session._caller.unary, []
+
+    def watch(method, request, timeout, **options):
+        repeatable.append(options["repeatable"])
+        return unary(method, request, timeout, **options)
+
+    etag = session.info().etag
+    monkeypatch.setattr(session._caller, "unary", watch)
+    session.store_relations([("cell", "cell")], etag=etag)
+    session.store_relations([])
+    assert repeatable == [False, True]
+
+
 def test_a_session_stores_from_the_beginning_what_it_was_created_with(client):
     session = client.create_session("storing", stored_relations=[("vertex", "cell")])
     session.import_mesh(TET, {"tetra": [[0, 1, 2, 3]]})

@@ -99,7 +99,8 @@ class Session(SessionReader):
             session=sessions_pb2.Session(name=self.name, etag=etag, settings=settings),
             update_mask=field_mask_pb2.FieldMask(paths=["settings.stored_relations"]),
         )
-        reply = self._caller.unary(self._sessions.UpdateSession, request, timeout, repeatable=True)
+        # An update changes the etag: one that was made, but not answered, would refuse its own repetition.
+        reply = self._caller.unary(self._sessions.UpdateSession, request, timeout, repeatable=not etag)
         return info_from_proto(reply.session)
 
     # ---- Writing ----
