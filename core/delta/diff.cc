@@ -1,6 +1,7 @@
 #include "core/delta/diff.h"
 
 #include <algorithm>
+#include <array>
 #include <limits>
 
 namespace dynmesh {
@@ -16,6 +17,36 @@ void MakeRoom(size_t count, std::vector<T>& items) {
   const size_t needed = items.size() + count;
   if (needed > items.capacity()) items.reserve(std::max(needed, 2 * items.capacity()));
 }
+
+/// Gathers changed elements in the cache and appends them to a delta a block at a time.
+class ElementBlock {
+ public:
+  explicit ElementBlock(ElementChanges& changes) : changes_(changes) {}
+
+  void Add(Slot slot, ElementType type, absl::Span<const VertexId> vertices) {
+    if (count_ == kCapacity) Flush();
+    slots_[count_] = slot;
+    types_[count_++] = type;
+    num_vertices_ = std::copy(vertices.begin(), vertices.end(), &vertices_[num_vertices_]) - vertices_.data();
+  }
+
+  void Flush() {
+    changes_.slots.insert(changes_.slots.end(), slots_.begin(), slots_.begin() + count_);
+    changes_.types.insert(changes_.types.end(), types_.begin(), types_.begin() + count_);
+    changes_.vertices.insert(changes_.vertices.end(), vertices_.begin(), vertices_.begin() + num_vertices_);
+    count_ = num_vertices_ = 0;
+  }
+
+ private:
+  static constexpr size_t kCapacity = 256;
+
+  ElementChanges& changes_;
+  size_t count_ = 0;
+  size_t num_vertices_ = 0;
+  std::array<Slot, kCapacity> slots_;
+  std::array<ElementType, kCapacity> types_;
+  std::array<VertexId, kCapacity * kMaxElementVertices> vertices_;
+};
 
 /// Appends after-images of slots to a delta.
 class DiffBuilder {
@@ -82,14 +113,13 @@ class DiffBuilder {
     MakeRoom(count, changes.slots);
     MakeRoom(count, changes.types);
     MakeRoom(count * kTypicalVertices, changes.vertices);
+    ElementBlock block(changes);
     mesh_.changed(kind).ForEachSince(from_, begin, end, [&](Slot slot) {
       const EntityId id(kind, slot);
       if (!mesh_.IsLive(id) || !mesh_.IsElement(id)) return changes.removed.push_back(slot);
-      const auto vertices = mesh_.VerticesOf(id);
-      changes.slots.push_back(slot);
-      changes.types.push_back(mesh_.Type(id));
-      changes.vertices.insert(changes.vertices.end(), vertices.begin(), vertices.end());
+      block.Add(slot, mesh_.Type(id), mesh_.VerticesOf(id));
     });
+    block.Flush();
   }
 
   /// Rows of dead slots travel too, as the zeros that removal left: derived entities die unseen by a mirror.

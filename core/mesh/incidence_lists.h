@@ -8,6 +8,7 @@
 #include "absl/container/flat_hash_map.h"
 #include "absl/container/inlined_vector.h"
 #include "absl/types/span.h"
+#include "core/mesh/erase_ascending.h"
 #include "core/mesh/ids.h"
 #include "core/mesh/pooled_lists.h"
 
@@ -31,6 +32,8 @@ class IncidenceLists {
   absl::Span<const UpperId> Of(Slot lower) const { return lists_.Of(lower); }
   uint32_t Length(Slot lower) const { return lists_.Length(lower); }
   bool HasRoom(uint32_t count) const { return lists_.HasRoom(count); }
+  void PrefetchList(Slot lower) const { lists_.PrefetchList(lower); }
+  void PrefetchEntries(Slot lower) const { lists_.PrefetchEntries(lower); }
 
   /// `first_room`: as PooledLists::PushBack.
   void Add(Slot lower, UpperId upper, uint32_t first_room = 2) {
@@ -38,22 +41,22 @@ class IncidenceLists {
     const uint32_t length = lists_.Length(lower);
     if (length > kIndexedLength) return IndexFrom(lower, length == kIndexedLength + 1 ? 0 : length - 1);
     const auto entries = lists_.MutableOf(lower);
-    uint32_t place = length - 1;
+    uint32_t place = length - 1;  // mostly the last: new slots ascend
     for (; place > 0 && upper < entries[place - 1]; --place) entries[place] = entries[place - 1];
     entries[place] = upper;
   }
 
   /// Removes one entry. REQUIRES: it is there.
   void Remove(Slot lower, UpperId upper) {
-    const uint32_t position = Position(lower, upper);
     const uint32_t last = lists_.Length(lower) - 1;
     const auto entries = lists_.MutableOf(lower);
     if (last >= kIndexedLength) {
+      const uint32_t position = positions_.find(Key(lower, upper))->second.back();
       IndexRemoved(lower, position, last);
       entries[position] = entries[last];
       if (last == kIndexedLength) std::sort(entries.begin(), entries.end() - 1);
     } else {
-      std::move(entries.begin() + position + 1, entries.end(), entries.begin() + position);
+      EraseAscending(SlotsOf(lower), last + 1, upper.slot());
     }
     lists_.PopBack(lower);
   }
@@ -76,11 +79,8 @@ class IncidenceLists {
  private:
   static uint64_t Key(Slot lower, UpperId upper) { return uint64_t{lower} << 32 | upper.slot(); }
 
-  uint32_t Position(Slot lower, UpperId upper) const {
-    const auto entries = Of(lower);
-    if (entries.size() > kIndexedLength) return positions_.find(Key(lower, upper))->second.back();
-    return std::find(entries.begin(), entries.end(), upper) - entries.begin();
-  }
+  /// An id is its slot.
+  Slot* SlotsOf(Slot lower) { return reinterpret_cast<Slot*>(lists_.MutableOf(lower).data()); }
 
   /// Indexes the entries of a long list from `first` on.
   void IndexFrom(Slot lower, uint32_t first) {

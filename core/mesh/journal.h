@@ -1,6 +1,8 @@
 #ifndef DYNMESH_CORE_MESH_JOURNAL_H_
 #define DYNMESH_CORE_MESH_JOURNAL_H_
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -12,17 +14,17 @@ namespace dynmesh {
 
 /// The smallest steps that edits are made of; each can be undone when all later ones have been.
 enum class JournalOp : uint8_t {
-  kCreate,           ///< entity began; a = born stamp before, b = changed stamp before
-  kDestroy,          ///< entity ended; its arrays still hold it; b = changed stamp before
-  kSetElement,       ///< element flag set; b = changed stamp before
-  kClearElement,     ///< element flag cleared; b = changed stamp before
-  kSetDuplicate,     ///< duplicate flag set
-  kClearDuplicate,   ///< duplicate flag cleared
-  kFlipEdge,         ///< the two vertices changed places
-  kReorderFace,      ///< a = FaceCode that leads back
-  kMoveVertex,       ///< b = changed stamp before; position before: Journal::positions
-  kAddAttribute,     ///< the last column was added
-  kSetAttribute,     ///< a = column, b = stamp before; row before: Journal::rows
+  kCreate,          ///< entity began; a = born stamp before, b = changed stamp before
+  kDestroy,         ///< entity ended; its arrays still hold it; b = changed stamp before
+  kSetElement,      ///< element flag set; b = changed stamp before
+  kClearElement,    ///< element flag cleared; b = changed stamp before
+  kSetDuplicate,    ///< duplicate flag set
+  kClearDuplicate,  ///< duplicate flag cleared
+  kFlipEdge,        ///< the two vertices changed places
+  kReorderFace,     ///< a = FaceCode that leads back
+  kMoveVertex,      ///< b = changed stamp before; position before: Journal::positions
+  kAddAttribute,    ///< the last column was added
+  kSetAttribute,    ///< a = column, b = stamp before; row before: Journal::rows
 };
 
 struct JournalEntry {
@@ -38,6 +40,12 @@ struct Journal {
   std::vector<JournalEntry> entries;
   std::vector<Point> positions;
   std::vector<uint8_t> rows;
+
+  /// Makes room for `count` entries more.
+  void Expect(size_t count) {
+    const size_t needed = entries.size() + count;
+    if (needed > entries.capacity()) entries.reserve(std::max(needed, 2 * entries.capacity()));
+  }
 
   void Clear() {
     entries.clear();

@@ -179,6 +179,8 @@ class Mesh {
   /// cells are tetrahedra; cell->edges where it is stored and all cells have as many. Else no ids. Valid
   /// until the next edit.
   FixedRows FixedRowsOf(Relation relation) const;
+  /// Vertices(f) and Edges(f) of faces stand so many entries apart.
+  size_t FaceStride() const { return face_stride_; }
   /// Whether no cell of another type was ever there.
   bool IsTetrahedral() const { return cell_vertex_stride_ == NumVertices(ElementType::kTetrahedron); }
 
@@ -283,6 +285,8 @@ class Mesh {
   };
   /// What AddCell knows of a cell's edges and faces while it gathers them.
   struct CellParts;
+  /// Of the edges that ElementTemplate::smart_edges names those that were found already; others are invalid.
+  using SmartEdges = std::array<EdgeId, 3>;
 
   uint8_t& flags(EntityId id) { return flags_[Dimension(id.kind)][id.slot]; }
   uint8_t flags(EntityId id) const { return flags_[Dimension(id.kind)][id.slot]; }
@@ -297,16 +301,17 @@ class Mesh {
   absl::Status CheckVertices(ElementType type, VertexSpan vertices) const;
   absl::Status CheckRoom(ElementType type) const;
   absl::Status CheckRemovable(EntityId id) const;
-  void Remove(EntityId id);
-  absl::StatusOr<EntityId> AddChecked(ElementType type, VertexSpan vertices);
+  /// What AddElement does after CheckVertices; the boundary of a cell is left to be settled.
+  absl::StatusOr<EntityId> AddChecked(ElementType type, VertexSpan vertices, const SmartEdges& known);
   absl::StatusOr<EntityId> AddWireEdge(VertexSpan vertices);
   absl::StatusOr<EntityId> AddFaceElement(VertexSpan vertices);
-  absl::StatusOr<EntityId> AddCell(ElementType type, VertexSpan vertices);
+  absl::StatusOr<EntityId> AddCell(ElementType type, VertexSpan vertices, const SmartEdges& known);
   absl::Status RefuseDuplicate(EntityId existing) const;
   CellId FindCell(ElementType type, const CellParts& parts) const;
   CellId FindCellButNot(CellId c, ElementType type, const CellParts& parts) const;
   bool HasFaces(CellId c, ElementType type, const CellParts& parts) const;
-  void FindCellParts(const ElementTemplate& shape, VertexSpan vertices, CellParts& parts) const;
+  void FindCellParts(const ElementTemplate& shape, VertexSpan vertices, const SmartEdges& known,
+                     CellParts& parts) const;
   FaceMatch FindFaceAround(EdgeId e, VertexSpan vertices) const;
   EdgeId LeastUsed(absl::Span<const EdgeId> edges) const;
   FaceMatch FindCellFace(const ElementTemplate& shape, int local_face, VertexSpan vertices,
@@ -316,8 +321,15 @@ class Mesh {
 
   // mesh_batches.cc
   std::vector<uint32_t> OrderOfElements(absl::Span<const VertexId> vertices, size_t size) const;
-  absl::Status RemoveAscending(EntityKind kind, absl::Span<const Slot> sorted,
-                               absl::Span<const Slot> elements);
+  void RemoveAll(EntityKind kind, absl::Span<const Slot> elements);
+  void RemoveCells(absl::Span<const Slot> cells);
+  void ReleaseFaces(absl::Span<const FaceId> faces);  ///< settles them, destroys those that nothing needs
+  void ReleaseEdges(absl::Span<const EdgeId> edges);
+  void SettleBoundaries(absl::Span<const Slot> cells);
+  absl::Status AddScattered(const ElementTemplate& shape, size_t count,
+                            absl::FunctionRef<VertexSpan(size_t)> element,
+                            absl::FunctionRef<absl::Status(size_t, const SmartEdges&)> add);
+  SmartEdges FindSmartEdges(const ElementTemplate& shape, VertexSpan vertices) const;
 
   // mesh_links.cc: creating and destroying single entities with their links, counters and journal
   EdgeId CreateEdge(VertexId a, VertexId b, uint8_t extra_flags);
@@ -327,8 +339,8 @@ class Mesh {
   void DestroyEdge(EdgeId e);
   void DestroyFace(FaceId f);
   void DestroyCell(CellId c);
-  void ReleaseEdge(EdgeId e);  ///< destroys it if nothing needs it
-  void ReleaseFace(FaceId f);  ///< destroys it, and then its edges, if nothing needs it
+  bool IsUnneeded(EdgeId e) const;
+  bool IsUnneeded(FaceId f) const;
 
   void CountElement(EntityId id, int change);
   void IndexHubEdges(VertexId v);
@@ -349,6 +361,11 @@ class Mesh {
   uint32_t NumFaceCells(FaceId f) const;
   void AddEdgeFace(EdgeId e, FaceId f);
   void RemoveEdgeFace(EdgeId e, FaceId f);
+  /// Puts a face, or those of a cell, onto the boundary or off it as their uses say. Whoever links or unlinks
+  /// cells owes it: many at once pass on what cancels out.
+  bool IsSettled(FaceId f) const;
+  void SettleBoundary(FaceId f);
+  void SettleBoundary(CellId c);
   void SetFaceOnBoundary(FaceId f, int change);
   void CountBoundary(EdgeId e, int change);
 

@@ -38,10 +38,12 @@ struct Mesh::CellParts {
 
 absl::StatusOr<EntityId> Mesh::AddElement(ElementType type, absl::Span<const VertexId> vertices) {
   DYNMESH_RETURN_IF_ERROR(CheckVertices(type, vertices));
-  return AddChecked(type, vertices);
+  const absl::StatusOr<EntityId> id = AddChecked(type, vertices, {});
+  if (id.ok() && id->kind == EntityKind::kCell) SettleBoundary(CellId(id->slot));
+  return id;
 }
 
-absl::StatusOr<EntityId> Mesh::AddChecked(ElementType type, VertexSpan vertices) {
+absl::StatusOr<EntityId> Mesh::AddChecked(ElementType type, VertexSpan vertices, const SmartEdges& known) {
   DYNMESH_RETURN_IF_ERROR(CheckRoom(type));
   switch (KindOf(type)) {
     case EntityKind::kEdge:
@@ -49,7 +51,7 @@ absl::StatusOr<EntityId> Mesh::AddChecked(ElementType type, VertexSpan vertices)
     case EntityKind::kFace:
       return AddFaceElement(vertices);
     default:
-      return AddCell(type, vertices);
+      return AddCell(type, vertices, known);
   }
 }
 
@@ -161,10 +163,12 @@ Mesh::FaceMatch Mesh::FindCellFace(const ElementTemplate& shape, int local_face,
   return FindFaceAround(around, FaceVertices(face, vertices).span());
 }
 
-void Mesh::FindCellParts(const ElementTemplate& shape, VertexSpan vertices, CellParts& parts) const {
+void Mesh::FindCellParts(const ElementTemplate& shape, VertexSpan vertices, const SmartEdges& known,
+                         CellParts& parts) const {
   for (int s = 0; s < shape.num_smart_edges; ++s) {
+    EdgeId& e = parts.edges[shape.smart_edges[s]];
     const LocalEdge& ends = shape.edges[shape.smart_edges[s]];
-    parts.edges[shape.smart_edges[s]] = FindEdge(vertices[ends.vertices[0]], vertices[ends.vertices[1]]);
+    e = known[s].valid() ? known[s] : FindEdge(vertices[ends.vertices[0]], vertices[ends.vertices[1]]);
   }
   for (int i = 0; i < shape.num_faces; ++i) {
     parts.faces[i] = FindCellFace(shape, i, vertices, parts);
@@ -262,10 +266,10 @@ absl::StatusOr<EntityId> Mesh::AddFaceElement(VertexSpan vertices) {
   return CreateFace(vertices, edge_span, kElementFlag | (match.face.valid() ? kDuplicateFlag : 0));
 }
 
-absl::StatusOr<EntityId> Mesh::AddCell(ElementType type, VertexSpan vertices) {
+absl::StatusOr<EntityId> Mesh::AddCell(ElementType type, VertexSpan vertices, const SmartEdges& known) {
   const ElementTemplate& shape = TemplateOf(type);
   CellParts parts;
-  FindCellParts(shape, vertices, parts);
+  FindCellParts(shape, vertices, known, parts);
   if (options_.duplicates == DuplicatePolicy::kRefuse) {
     if (const CellId twin = FindCell(type, parts); twin.valid()) return RefuseDuplicate(twin);
   }
@@ -301,7 +305,7 @@ void Mesh::EnsureCellParts(const ElementTemplate& shape, VertexSpan vertices, Ce
 
 absl::Status Mesh::RemoveElement(EntityId id) {
   DYNMESH_RETURN_IF_ERROR(CheckRemovable(id));
-  Remove(id);
+  RemoveAll(id.kind, {&id.slot, 1});
   return absl::OkStatus();
 }
 
@@ -317,12 +321,6 @@ absl::Status Mesh::CheckRemovable(EntityId id) const {
         {{"kind", std::string(EntityKindName(id.kind))}, {"ids", absl::StrCat(id.slot)}});
   }
   return absl::OkStatus();
-}
-
-void Mesh::Remove(EntityId id) {
-  if (id.kind == EntityKind::kCell) return DestroyCell(CellId(id.slot));
-  ClearElementFlag(id);
-  id.kind == EntityKind::kFace ? ReleaseFace(FaceId(id.slot)) : ReleaseEdge(EdgeId(id.slot));
 }
 
 }  // namespace dynmesh

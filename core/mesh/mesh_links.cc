@@ -76,7 +76,6 @@ void Mesh::DestroyFace(FaceId f) {
   UnlinkFace(f);
   mutable_slots(EntityKind::kFace).Free(f.slot());
   PassOnPrimary(f);
-  for (EdgeId e : Edges(f)) ReleaseEdge(e);
 }
 
 void Mesh::DestroyCell(CellId c) {
@@ -85,16 +84,11 @@ void Mesh::DestroyCell(CellId c) {
   UnlinkCell(c);
   CountElement(c, -1);
   mutable_slots(EntityKind::kCell).Free(c.slot());
-  for (OrientedFace oriented : Faces(c)) ReleaseFace(oriented.face());
 }
 
-void Mesh::ReleaseEdge(EdgeId e) {
-  if (IsLive(e) && !IsElement(e) && IncidentFaces(e).empty()) DestroyEdge(e);
-}
+bool Mesh::IsUnneeded(EdgeId e) const { return IsLive(e) && !IsElement(e) && IncidentFaces(e).empty(); }
 
-void Mesh::ReleaseFace(FaceId f) {
-  if (IsLive(f) && !IsElement(f) && NumFaceCells(f) == 0) DestroyFace(f);
-}
+bool Mesh::IsUnneeded(FaceId f) const { return IsLive(f) && !IsElement(f) && NumFaceCells(f) == 0; }
 
 // ---- Links ----
 
@@ -196,10 +190,8 @@ void Mesh::AddFaceCell(FaceId f, CellId c) {
     uses = {CellId(list), kOverflow};
   } else if (uses[0].valid()) {
     uses = {std::min(uses[0], c), std::max(uses[0], c)};
-    SetFaceOnBoundary(f, -1);
   } else {
     uses[0] = c;
-    SetFaceOnBoundary(f, +1);
   }
 }
 
@@ -216,10 +208,8 @@ void Mesh::RemoveFaceCell(FaceId f, CellId c) {
   } else if (uses[1].valid()) {
     if (uses[0] == c) uses[0] = uses[1];
     uses[1] = CellId();
-    SetFaceOnBoundary(f, +1);
   } else {
     uses[0] = CellId();
-    SetFaceOnBoundary(f, -1);
   }
 }
 
@@ -237,6 +227,19 @@ void Mesh::RemoveEdgeFace(EdgeId e, FaceId f) {
 }
 
 // ---- Boundary ----
+
+bool Mesh::IsSettled(FaceId f) const {
+  const auto& uses = face_cells_[f.slot()];
+  return (uses[0].valid() && !uses[1].valid()) == IsOnBoundary(f);
+}
+
+void Mesh::SettleBoundary(FaceId f) {
+  if (!IsSettled(f)) SetFaceOnBoundary(f, IsOnBoundary(f) ? -1 : +1);
+}
+
+void Mesh::SettleBoundary(CellId c) {
+  for (OrientedFace oriented : Faces(c)) SettleBoundary(oriented.face());
+}
 
 void Mesh::SetFaceOnBoundary(FaceId f, int change) {
   boundary_[2].Assign(f.slot(), change > 0);

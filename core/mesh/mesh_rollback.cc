@@ -63,6 +63,7 @@ void Mesh::UndoCreate(const JournalEntry& entry) {
       break;
     case EntityKind::kCell:
       UnlinkCell(CellId(entry.slot));
+      SettleBoundary(CellId(entry.slot));
       break;
   }
   const EntityId id(entry.kind, entry.slot);
@@ -89,6 +90,7 @@ void Mesh::UndoDestroy(const JournalEntry& entry) {
       break;
     case EntityKind::kCell:
       LinkCell(CellId(entry.slot));
+      SettleBoundary(CellId(entry.slot));
       CountElement(CellId(entry.slot), +1);
       break;
   }

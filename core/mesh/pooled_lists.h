@@ -8,7 +8,9 @@
 #include <vector>
 
 #include "absl/types/span.h"
+#include "core/mesh/erase_ascending.h"
 #include "core/mesh/ids.h"
+#include "core/mesh/pipeline.h"
 
 namespace dynmesh {
 
@@ -24,7 +26,8 @@ class PooledLists {
   /// Of all lists together, with a margin for the room that size classes leave.
   static constexpr uint64_t kMaxEntries = 0xc0000000u;
 
-  /// So many entries can be read from the begin of each list, however short it is.
+  /// So many entries can be read from the begin of each list, however short it is; behind a longer list
+  /// kListMargin.
   static constexpr size_t kReadable = 8;
 
   absl::Span<const T> Of(Slot slot) const {
@@ -35,6 +38,10 @@ class PooledLists {
     const List& list = lists_[slot];
     return absl::MakeSpan(pool_.data() + list.offset, list.length);
   }
+
+  /// Ask memory for where a list stands, and for what it holds.
+  void PrefetchList(Slot slot) const { Prefetch(lists_.data() + slot); }
+  void PrefetchEntries(Slot slot) const { Prefetch(Of(slot).data()); }
 
   Slot size() const { return lists_.size(); }
   uint32_t Length(Slot slot) const { return slot < lists_.size() ? lists_[slot].length : 0; }
@@ -58,7 +65,7 @@ class PooledLists {
     List& list = lists_[slot];
     --list.length;
     if (list.length < Capacity(list.size_class) / 2 && list.size_class > kSmallClasses) {
-      Move(slot, ClassFor(list.length + list.length / 4));
+      Move(slot, ClassFor(list.length + list.length / 4), 0);
     } else if (list.length == 0) {
       Move(slot, 0);
     }
@@ -108,6 +115,7 @@ class PooledLists {
   // Size classes: 0 has no room; 1..8 hold 1..8; then four a doubling up to 256 (class 28), then two.
   static constexpr uint32_t kSmallClasses = 8;
   static constexpr int kNumClasses = 64;
+  static constexpr uint32_t kSpareClasses = 3;  ///< so much larger may a recycled room be
   static constexpr uint64_t kMaxPool = 0xf0000000u;
 
   static constexpr std::array<uint32_t, kNumClasses> MakeCapacities() {
@@ -124,6 +132,7 @@ class PooledLists {
     return capacities;
   }
   static constexpr std::array<uint32_t, kNumClasses> kCapacities = MakeCapacities();
+  static_assert(kReadable >= kListMargin);
   static_assert(kCapacities[kNumClasses - 1] >= kMaxLength);
 
   struct List {
@@ -146,28 +155,35 @@ class PooledLists {
     return std::lower_bound(kCapacities.begin(), kCapacities.end(), length) - kCapacities.begin();
   }
 
-  /// Gives the list a room of another size class and recycles the old one.
-  void Move(Slot slot, uint32_t new_class) {
-    const uint32_t old_class = lists_[slot].size_class;
-    if (new_class == old_class) return;
-    const uint32_t old_offset = lists_[slot].offset;
-    const uint32_t new_offset = new_class == 0 ? 0 : TakeRoom(new_class);
-    std::copy_n(pool_.data() + old_offset, lists_[slot].length, pool_.data() + new_offset);
-    if (old_class != 0) free_rooms_[old_class].push_back(old_offset);
-    lists_[slot].offset = new_offset;
-    lists_[slot].size_class = new_class;
+  /// Gives the list a room of another size class, or up to `spare` classes larger, and recycles the old one.
+  void Move(Slot slot, uint32_t new_class, uint32_t spare = kSpareClasses) {
+    const List old = lists_[slot];
+    if (new_class == old.size_class) return;
+    List& list = lists_[slot];
+    new_class == 0 ? LeaveRoom(list) : TakeRoom(new_class, spare, list);
+    std::copy_n(pool_.data() + old.offset, old.length, pool_.data() + list.offset);
+    if (old.size_class != 0) free_rooms_[old.size_class].push_back(old.offset);
   }
 
-  uint32_t TakeRoom(uint32_t size_class) {
-    auto& rooms = free_rooms_[size_class];
-    if (!rooms.empty()) {
-      const uint32_t offset = rooms.back();
-      rooms.pop_back();
-      return offset;
+  static void LeaveRoom(List& list) {
+    list.offset = 0;
+    list.size_class = 0;
+  }
+
+  /// A free room of the size class or of the next `spare` ones, or a new one.
+  void TakeRoom(uint32_t size_class, uint32_t spare, List& list) {
+    const uint32_t largest = std::min<uint32_t>(size_class + spare, kNumClasses - 1);
+    for (uint32_t c = size_class; c <= largest; ++c) {
+      auto& rooms = free_rooms_[c];
+      if (rooms.empty()) continue;
+      list.offset = rooms.back();
+      list.size_class = c;
+      return rooms.pop_back();
     }
-    const uint32_t offset = pool_.size() - kReadable;
+    const size_t offset = pool_.size() - kReadable;
     pool_.resize(pool_.size() + Capacity(size_class));
-    return offset;
+    list.offset = offset;
+    list.size_class = size_class;
   }
 
   std::vector<List> lists_;

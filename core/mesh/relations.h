@@ -4,13 +4,16 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <cstdlib>
 #include <type_traits>
 #include <vector>
 
 #include "absl/types/span.h"
 #include "core/mesh/inverse_rows.h"
 #include "core/mesh/mesh.h"
+#include "core/mesh/pipeline.h"
 #include "core/mesh/row_block.h"
+#include "core/mesh/tetrahedron_edges.h"
 
 /// The 16 neighbour relations V/E/F/C -> V/E/F/C (paper, section 4).
 ///
@@ -124,20 +127,36 @@ void ForEachFixedRow(const BitSet& live, const Slot* ids, Fn& fn) {
 template <typename Fn>
 void ForEachTetrahedronFaces(const Mesh& mesh, Fn& fn) {
   mesh.slots(EntityKind::kCell).live().ForEachRun([&](Slot begin, Slot end) {
-    std::array<Slot, 4 * 64> faces;
-    const OrientedFace* oriented = mesh.Faces(CellId(begin)).data();
-    for (size_t i = 0; i < 4 * (end - begin); ++i) faces[i] = oriented[i].face().slot();
-    ForEachFixedRow<4>(faces.data(), begin, end, fn);
+    const OrientedFace* faces = mesh.Faces(CellId(begin)).data();
+    for (Slot c = begin; c < end; ++c, faces += 4) {
+      const std::array<Slot, 4> row = {faces[0].face().slot(), faces[1].face().slot(), faces[2].face().slot(),
+                                       faces[3].face().slot()};
+      fn(c, absl::MakeConstSpan(row.data(), 4));
+    }
   });
 }
 
-/// All rows of cell->edges of a mesh of tetrahedra.
-template <typename Fn>
+/// All rows of cell->edges of a mesh of tetrahedra whose faces stand kStride entries apart.
+template <size_t kStride, typename Fn>
 void ForEachTetrahedronEdges(const Mesh& mesh, Fn& fn) {
+  constexpr Slot kAhead = 16;  // so many cells ahead memory is fetched where faces are scattered
+  const Slot limit = mesh.slots(EntityKind::kCell).limit();
+  if (limit == 0) return;
+  const OrientedFace* const faces = mesh.Faces(CellId(0)).data();
+  const EdgeId* const edges = mesh.Edges(FaceId(0)).data();
+  const Slot last = limit - 1;
   mesh.slots(EntityKind::kCell).live().ForEachRun([&](Slot begin, Slot end) {
-    std::array<Slot, 6 * 64> edges;
-    CopyTetrahedronEdges(mesh, begin, end, edges.data());
-    ForEachFixedRow<6>(edges.data(), begin, end, fn);
+    const int64_t distance = int64_t{faces[4 * size_t{begin}].face().slot()} -
+                             faces[4 * size_t{std::min(begin + kAhead, last)}].face().slot();
+    const bool scattered = std::abs(distance) > kAhead * kAhead;
+    for (Slot c = begin; c < end; ++c) {
+      if (scattered) {
+        const OrientedFace* const ahead = faces + 4 * size_t{std::min(c + kAhead, last)};
+        for (int i = 0; i < 3; ++i) Prefetch(edges + kStride * ahead[i].face().slot());
+      }
+      const std::array<Slot, 6> row = TetrahedronEdges<kStride>(faces + 4 * size_t{c}, edges);
+      fn(c, absl::MakeConstSpan(row.data(), 6));
+    }
   });
 }
 
@@ -162,7 +181,10 @@ bool ForEachFixedRow(const Mesh& mesh, Relation relation, Fn& fn) {
   }
   if (relation.from != EntityKind::kCell || !mesh.IsTetrahedral()) return false;
   if (relation.to == EntityKind::kFace) return ForEachTetrahedronFaces(mesh, fn), true;
-  if (relation.to == EntityKind::kEdge) return ForEachTetrahedronEdges(mesh, fn), true;
+  if (relation.to == EntityKind::kEdge) {
+    mesh.FaceStride() == 3 ? ForEachTetrahedronEdges<3>(mesh, fn) : ForEachTetrahedronEdges<4>(mesh, fn);
+    return true;
+  }
   return false;
 }
 

@@ -6,25 +6,13 @@
 
 #include "core/mesh/cells_across.h"
 #include "core/mesh/sort_unique.h"
+#include "core/mesh/tetrahedron_edges.h"
 
 namespace dynmesh {
 namespace {
 
 /// How many rows ahead memory is fetched.
 constexpr size_t kAhead = 16;
-
-/// kStoredEdge[n - 3][code][k]: FaceCode{code}.StoredEdge(k, n), as a table.
-using StoredEdges = std::array<std::array<std::array<uint8_t, kMaxFaceVertices>, 8>, 2>;
-constexpr StoredEdges MakeStoredEdges() {
-  StoredEdges stored{};
-  for (int n = 3; n <= 4; ++n) {
-    for (int code = 0; code < 8; ++code) {
-      for (int k = 0; k < n; ++k) stored[n - 3][code][k] = FaceCode{uint8_t(code)}.StoredEdge(k, n);
-    }
-  }
-  return stored;
-}
-constexpr StoredEdges kStoredEdge = MakeStoredEdges();
 
 /// Faces of a cell at each of its vertices, as bits.
 using VertexFaces = std::array<std::array<uint8_t, kMaxElementVertices>, kNumElementTypes + 1>;
@@ -57,22 +45,6 @@ void RowBlock::Grow(size_t needed) {
 class RowKernels {
  public:
   RowKernels(const Mesh& mesh, RowBlock& block) : mesh_(mesh), block_(block), plain_(mesh.IsPlain()) {}
-
-  static void CopyTetrahedronEdges(const Mesh& mesh, Slot begin, Slot end, Slot* out) {
-    const OrientedFace* const faces = mesh.cell_faces_.data();
-    const EdgeId* const edges = mesh.face_edges_.data();
-    const size_t stride = mesh.face_stride_;
-    const Slot last = mesh.slots(EntityKind::kCell).limit() - 1;
-    const Slot far = std::min<Slot>(begin + kAhead, last);
-    const bool scattered = Distance(faces[4 * size_t{begin}], faces[4 * size_t{far}]) > kAhead * kAhead;
-    for (Slot c = begin; c < end; ++c, out += 6) {
-      if (scattered) {
-        const OrientedFace* const ahead = faces + 4 * size_t{std::min<Slot>(c + kAhead, last)};
-        for (int i = 0; i < 3; ++i) __builtin_prefetch(edges + ahead[i].face().slot() * stride);
-      }
-      TetEdges(faces + 4 * size_t{c}, edges, stride, out);
-    }
-  }
 
   void Gather(Relation relation, absl::Span<const Slot> slots) {
     block_.size_ = 0;
@@ -379,17 +351,16 @@ class RowKernels {
       if (i + ahead < slots.size()) FetchFaceEdges(slots[i + ahead]);
       const ElementType type = mesh_.Type(CellId(slots[i]));
       const OrientedFace* faces = &mesh_.cell_faces_[size_t{slots[i]} * mesh_.cell_face_stride_];
-      out = type == ElementType::kTetrahedron
-                ? TetEdges(faces, mesh_.face_edges_.data(), mesh_.face_stride_, out)
-                : EdgesOf(CellId(slots[i]), out);
+      if (type == ElementType::kTetrahedron) {
+        const auto edges = mesh_.face_stride_ == 3 ? TetrahedronEdges<3>(faces, mesh_.face_edges_.data())
+                                                   : TetrahedronEdges<4>(faces, mesh_.face_edges_.data());
+        out = std::copy(edges.begin(), edges.end(), out);
+      } else {
+        out = EdgesOf(CellId(slots[i]), out);
+      }
       block_.offsets_[i + 1] = out - begin;
     }
     block_.size_ = out - begin;
-  }
-
-  static size_t Distance(OrientedFace a, OrientedFace b) {
-    const Slot one = a.face().slot(), other = b.face().slot();
-    return one < other ? other - one : one - other;
   }
 
   /// Whether the faces of cells that follow each other lie far apart, so that fetching them ahead pays.
@@ -413,22 +384,6 @@ class RowKernels {
     }
   }
 
-  /// Edges 0-1, 1-2, 2-0, 0-3, 1-3, 2-3 from faces 0 1 3, 1 2 3 and 2 0 3.
-  static Slot* TetEdges(const OrientedFace* faces, const EdgeId* face_edges, size_t stride, Slot* out) {
-    const EdgeId* const first = face_edges + faces[0].face().slot() * stride;
-    const EdgeId* const second = face_edges + faces[1].face().slot() * stride;
-    const EdgeId* const third = face_edges + faces[2].face().slot() * stride;
-    const auto& in_first = kStoredEdge[0][faces[0].code().value];
-    const auto& in_second = kStoredEdge[0][faces[1].code().value];
-    out[0] = first[in_first[0]].slot();
-    out[1] = second[in_second[0]].slot();
-    out[2] = third[kStoredEdge[0][faces[2].code().value][0]].slot();
-    out[3] = first[in_first[2]].slot();
-    out[4] = first[in_first[1]].slot();
-    out[5] = second[in_second[1]].slot();
-    return out + 6;
-  }
-
   Slot* EdgesOf(CellId c, Slot* out) const {
     const int num_edges = TemplateOf(mesh_.Type(c)).num_edges;
     for (int e = 0; e < num_edges; ++e) *out++ = mesh_.Edge(c, e).slot();
@@ -440,10 +395,6 @@ class RowKernels {
   const bool plain_;
   std::vector<Corner> corners_;
 };
-
-void CopyTetrahedronEdges(const Mesh& mesh, Slot begin, Slot end, Slot* out) {
-  RowKernels::CopyTetrahedronEdges(mesh, begin, end, out);
-}
 
 void RowBlock::Gather(const Mesh& mesh, Relation relation, absl::Span<const Slot> slots) {
   RowKernels(mesh, *this).Gather(relation, slots);

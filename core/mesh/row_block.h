@@ -47,10 +47,6 @@ class RowBlock {
   std::array<size_t, kMaxRows + 1> offsets_;
 };
 
-/// Writes the six edges of each of the tetrahedra begin, ..., end - 1 to `out`, in template order. REQUIRES:
-/// all are live; mesh.IsTetrahedral().
-void CopyTetrahedronEdges(const Mesh& mesh, Slot begin, Slot end, Slot* out);
-
 }  // namespace dynmesh
 
 #endif  // DYNMESH_CORE_MESH_ROW_BLOCK_H_

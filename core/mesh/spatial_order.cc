@@ -12,7 +12,10 @@ constexpr int kMaxBits = 21;     // for each axis: the key has 63
 constexpr int kSortBits = 11;    // of one pass of the radix sort
 constexpr int kGradingBits = 5;  // finer than a uniform mesh needs: graded meshes crowd into few grid cells
 
-using Axes = std::array<uint32_t, 3>;
+/// Grid coordinates of four points at a time, along three axes.
+constexpr size_t kNumLanes = 4;
+using Lanes = uint32_t __attribute__((vector_size(kNumLanes * sizeof(uint32_t))));
+using Axes = std::array<Lanes, 3>;
 
 struct KeyedIndex {
   uint64_t key;
@@ -26,22 +29,24 @@ int BitsFor(size_t num_points) {
 
 /// Skilling's transform: grid coordinates into the transposed Hilbert index.
 Axes Transpose(Axes x, int bits) {
-  for (uint32_t q = uint32_t{1} << (bits - 1); q > 1; q >>= 1) {
-    const uint32_t p = q - 1;
+  const auto bit = [](const Lanes& v, int b) {
+    return Lanes{} - ((v >> b) & 1);
+  };  // all ones where it is set
+  for (int b = bits - 1; b > 0; --b) {
+    const uint32_t p = (uint32_t{1} << b) - 1;
     for (int axis = 0; axis < 3; ++axis) {
       // Bit set: invert the low bits of x[0]. Clear: swap them with those of x[axis].
-      const uint32_t set = -static_cast<uint32_t>((x[axis] & q) != 0);
-      const uint32_t swap = (x[0] ^ x[axis]) & p & ~set;
+      const Lanes set = bit(x[axis], b);
+      const Lanes swap = (x[0] ^ x[axis]) & p & ~set;
       x[0] ^= swap | (p & set);
       x[axis] ^= swap;
     }
   }
   x[1] ^= x[0];
   x[2] ^= x[1];
-  uint32_t gray = 0;
-  for (uint32_t q = uint32_t{1} << (bits - 1); q > 1; q >>= 1)
-    gray ^= -static_cast<uint32_t>((x[2] & q) != 0) & (q - 1);
-  for (uint32_t& axis : x) axis ^= gray;
+  Lanes gray = {};
+  for (int b = bits - 1; b > 0; --b) gray ^= bit(x[2], b) & ((uint32_t{1} << b) - 1);
+  for (Lanes& axis : x) axis ^= gray;
   return x;
 }
 
@@ -55,9 +60,8 @@ uint64_t Spread(uint64_t x) {
   return x;
 }
 
-uint64_t HilbertKey(const Axes& grid, int bits) {
-  const Axes x = Transpose(grid, bits);
-  return Spread(x[0]) << 2 | Spread(x[1]) << 1 | Spread(x[2]);
+uint64_t Interleave(const Axes& x, size_t lane) {
+  return Spread(x[0][lane]) << 2 | Spread(x[1][lane]) << 1 | Spread(x[2][lane]);
 }
 
 /// Maps the bounding cube of points to grid coordinates. Halves first, so that no difference overflows.
@@ -77,12 +81,15 @@ class Grid {
       half_extent_ = std::max(half_extent_, high[axis] / 2 - low_[axis] / 2);
   }
 
-  Axes Of(const Point& p) const {
-    Axes grid = {0, 0, 0};
+  /// Of at most kNumLanes points.
+  Axes Of(absl::Span<const Point> points) const {
+    Axes grid = {};
     if (!(half_extent_ > 0)) return grid;
-    for (int axis = 0; axis < 3; ++axis) {
-      const double place = (p[axis] / 2 - low_[axis] / 2) / half_extent_;
-      grid[axis] = static_cast<uint32_t>(std::clamp(place, 0.0, 1.0) * top_);
+    for (size_t lane = 0; lane < points.size(); ++lane) {
+      for (int axis = 0; axis < 3; ++axis) {
+        const double place = (points[lane][axis] / 2 - low_[axis] / 2) / half_extent_;
+        grid[axis][lane] = static_cast<uint32_t>(std::clamp(place, 0.0, 1.0) * top_);
+      }
     }
     return grid;
   }
@@ -114,7 +121,12 @@ Permutation HilbertOrder(absl::Span<const Point> points) {
   const int bits = BitsFor(points.size());
   const Grid grid(points, bits);
   std::vector<KeyedIndex> items(points.size()), sorted(points.size());
-  for (uint32_t i = 0; i < points.size(); ++i) items[i] = {HilbertKey(grid.Of(points[i]), bits), i};
+  for (size_t i = 0; i < points.size(); i += kNumLanes) {
+    const auto few = points.subspan(i, kNumLanes);
+    const Axes x = Transpose(grid.Of(few), bits);
+    for (size_t lane = 0; lane < few.size(); ++lane)
+      items[i + lane] = {Interleave(x, lane), static_cast<uint32_t>(i + lane)};
+  }
   for (int shift = 0; shift < 3 * bits; shift += kSortBits) {
     RadixPass(items, shift, sorted);
     items.swap(sorted);

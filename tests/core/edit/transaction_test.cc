@@ -96,6 +96,65 @@ TEST(TransactionTest, RemovingAndAddingManyCellsInAnyOrderGivesTheSameMesh) {
   ExpectEqualsOracle(mesh, ModelOf(mesh));
 }
 
+/// Every `step`-th cell of a mesh, and an edit that adds them again.
+std::pair<std::vector<Slot>, AddElementsEdit> EveryCell(const Mesh& mesh, Slot step) {
+  std::vector<Slot> cells;
+  AddElementsEdit again{ElementType::kTetrahedron, {}};
+  for (Slot c = 0; c < mesh.NumLive(EntityKind::kCell); c += step) {
+    cells.push_back(c);
+    for (VertexId v : mesh.Vertices(CellId(c))) again.vertices.push_back(v.slot());
+  }
+  return {cells, again};
+}
+
+TEST(TransactionTest, CellsFarApartGoAndComeBackAsOthersDo) {
+  for (Slot step : {1u, 2u, 50u}) {
+    Mesh mesh = TetGrid(7, 7, 7);
+    const auto [cells, again] = EveryCell(mesh, step);
+    ASSERT_TRUE(ApplyBatch(mesh, {RemoveElementsEdit{EntityKind::kCell, cells}}, {}).ok());
+    ExpectEqualsOracle(mesh, ModelOf(mesh));
+    ASSERT_TRUE(ApplyBatch(mesh, {again}, {}).ok());
+    ExpectEqualsOracle(mesh, ModelOf(mesh));
+    const std::string before = Describe(mesh);
+    const Edit both[] = {RemoveElementsEdit{EntityKind::kCell, cells}, again};
+    ASSERT_TRUE(ApplyBatch(mesh, both, {.dry_run = true}).ok());
+    EXPECT_EQ(Describe(mesh), before);
+  }
+}
+
+TEST(TransactionTest, ARefusalAfterManyCellsPutsTheBoundaryBack) {
+  for (Slot step : {1u, 50u}) {
+    MeshOptions options;
+    options.duplicates = DuplicatePolicy::kRefuse;
+    Mesh mesh(options);
+    const Mesh grid = TetGrid(7, 7, 7);
+    AddVerticesEdit vertices;
+    grid.slots(EntityKind::kVertex).live().ForEach([&](Slot v) {
+      vertices.positions.push_back(grid.Position(VertexId(v)));
+    });
+    auto [cells, edit] = EveryCell(grid, step);
+    for (Slot& v : edit.vertices) v |= kNewVertex;
+    ASSERT_TRUE(
+        ApplyBatch(mesh,
+                   {vertices, AddElementsEdit{edit.type, {edit.vertices.begin(), edit.vertices.begin() + 4}}},
+                   {})
+            .ok());
+    const std::string before = Describe(mesh);
+    const auto& slots = grid.Vertices(CellId(0));
+    const auto refused = ApplyBatch(mesh,
+                                    {vertices, edit, RemoveElementsEdit{EntityKind::kCell, {0}},
+                                     AddElementsEdit{edit.type, {slots[0].slot(), slots[0].slot()}}},
+                                    {});
+    EXPECT_FALSE(refused.ok());
+    EXPECT_EQ(Describe(mesh), before);
+    edit.vertices.insert(edit.vertices.end(), edit.vertices.begin(), edit.vertices.begin() + 4);
+    const auto twice = ApplyBatch(mesh, {vertices, edit}, {});
+    EXPECT_EQ(ErrorReason(twice.status()), reason::kDuplicateElement);
+    EXPECT_EQ(Describe(mesh), before);
+    ExpectEqualsOracle(mesh, ModelOf(mesh));
+  }
+}
+
 TEST(TransactionTest, OfEqualCellsInALargeBatchAllButTheFirstAreDuplicates) {
   Mesh mesh = TetGrid(3, 3, 3);
   AddElementsEdit twice = AllCells(mesh);

@@ -9,7 +9,9 @@
 #include <vector>
 
 #include "core/mesh/bit_set.h"
+#include "core/mesh/erase_ascending.h"
 #include "core/mesh/incidence_lists.h"
+#include "core/mesh/pipeline.h"
 #include "core/mesh/slots.h"
 #include "core/mesh/stamps.h"
 
@@ -200,6 +202,40 @@ TEST_F(IncidenceListsTest, OneEntryTwiceIsRemovedOnceAtATime) {
   lists_.Remove(3, EdgeId(9));
   EXPECT_THAT(lists_.Of(3), ElementsAre(EdgeId(9)));
   EXPECT_THAT(lists_.Of(99), IsEmpty());
+}
+
+TEST(EraseAscendingTest, RemovesOneEntryAndLeavesWhatStandsBehind) {
+  std::mt19937 rng(11);
+  for (size_t length = 1; length <= 40; ++length) {
+    for (int round = 0; round < 50; ++round) {
+      std::vector<Slot> list(length + kListMargin);
+      for (Slot& slot : list) slot = rng() % (2 * length);  // some entries are equal
+      std::sort(list.begin(), list.begin() + length);
+      const Slot value = list[rng() % length];
+      std::vector<Slot> expected = list;
+      std::move(std::find(expected.begin(), expected.end(), value) + 1, expected.begin() + length,
+                std::find(expected.begin(), expected.end(), value));
+      EraseAscending(list.data(), length, value);
+      expected[length - 1] = list[length - 1];  // no longer of the list
+      ASSERT_EQ(list, expected) << length << " entries, removed " << value;
+    }
+  }
+}
+
+TEST(PipelineTest, RunsEveryStageOfEveryItemInOrderAndAheadOfTheNextStage) {
+  for (size_t count : {0u, 1u, 5u, 6u, 100u}) {
+    std::vector<size_t> done(3);
+    const auto stage = [&](size_t s) {
+      return [&done, s](size_t i) {
+        EXPECT_EQ(i, done[s]++);
+        if (s > 0) {
+          EXPECT_GT(done[s - 1], i);
+        }
+      };
+    };
+    Pipeline(count, stage(0), stage(1), stage(2));
+    EXPECT_THAT(done, ElementsAre(count, count, count));
+  }
 }
 
 }  // namespace
