@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <numeric>
 
 namespace dynmesh {
 namespace {
@@ -17,36 +18,6 @@ void MakeRoom(size_t count, std::vector<T>& items) {
   const size_t needed = items.size() + count;
   if (needed > items.capacity()) items.reserve(std::max(needed, 2 * items.capacity()));
 }
-
-/// Gathers changed elements in the cache and appends them to a delta a block at a time.
-class ElementBlock {
- public:
-  explicit ElementBlock(ElementChanges& changes) : changes_(changes) {}
-
-  void Add(Slot slot, ElementType type, absl::Span<const VertexId> vertices) {
-    if (count_ == kCapacity) Flush();
-    slots_[count_] = slot;
-    types_[count_++] = type;
-    num_vertices_ = std::copy(vertices.begin(), vertices.end(), &vertices_[num_vertices_]) - vertices_.data();
-  }
-
-  void Flush() {
-    changes_.slots.insert(changes_.slots.end(), slots_.begin(), slots_.begin() + count_);
-    changes_.types.insert(changes_.types.end(), types_.begin(), types_.begin() + count_);
-    changes_.vertices.insert(changes_.vertices.end(), vertices_.begin(), vertices_.begin() + num_vertices_);
-    count_ = num_vertices_ = 0;
-  }
-
- private:
-  static constexpr size_t kCapacity = 256;
-
-  ElementChanges& changes_;
-  size_t count_ = 0;
-  size_t num_vertices_ = 0;
-  std::array<Slot, kCapacity> slots_;
-  std::array<ElementType, kCapacity> types_;
-  std::array<VertexId, kCapacity * kMaxElementVertices> vertices_;
-};
 
 /// Appends after-images of slots to a delta.
 class DiffBuilder {
@@ -97,11 +68,34 @@ class DiffBuilder {
                                 : VisitElements(kind, cursor.next, end, count);
   }
 
+  /// Calls whole(begin, end) for pages of [begin, end) all of whose slots changed and live, and one(slot) for
+  /// every other slot that changed.
+  template <typename Whole, typename One>
+  void ForEachChange(EntityKind kind, Slot begin, Slot end, Whole whole, One one) const {
+    const StampColumn& stamps = mesh_.changed(kind);
+    const BitSet& live = mesh_.slots(kind).live();
+    for (Slot page = begin; page < end;) {
+      const Slot next =
+          std::min<uint64_t>(end, (page / StampColumn::kPageSlots + 1) * uint64_t{StampColumn::kPageSlots});
+      if (stamps.AreAllSince(from_, page, next) && live.TestAll(page, next)) {
+        whole(page, next);
+      } else {
+        stamps.ForEachSince(from_, page, next, one);
+      }
+      page = next;
+    }
+  }
+
   /// Of `count` changed slots in [begin, end).
   void VisitVertices(Slot begin, Slot end, size_t count) {
     MakeRoom(count, delta_.vertex_slots);
     MakeRoom(count, delta_.positions);
-    mesh_.changed(EntityKind::kVertex).ForEachSince(from_, begin, end, [&](Slot slot) {
+    const auto whole = [&](Slot first, Slot last) {
+      AppendRange(first, last, delta_.vertex_slots);
+      const Point* positions = &mesh_.Position(VertexId(first));
+      delta_.positions.insert(delta_.positions.end(), positions, positions + (last - first));
+    };
+    ForEachChange(EntityKind::kVertex, begin, end, whole, [&](Slot slot) {
       if (!mesh_.IsLive(VertexId(slot))) return delta_.removed_vertices.push_back(slot);
       delta_.vertex_slots.push_back(slot);
       delta_.positions.push_back(mesh_.Position(VertexId(slot)));
@@ -113,13 +107,36 @@ class DiffBuilder {
     MakeRoom(count, changes.slots);
     MakeRoom(count, changes.types);
     MakeRoom(count * kTypicalVertices, changes.vertices);
-    ElementBlock block(changes);
+    if (kind == EntityKind::kCell && mesh_.IsTetrahedral()) return VisitTetrahedra(begin, end, changes);
+    VisitEach(kind, begin, end, changes);
+  }
+
+  void VisitTetrahedra(Slot begin, Slot end, ElementChanges& changes) {
+    const auto whole = [&](Slot first, Slot last) {
+      AppendRange(first, last, changes.slots);
+      changes.types.insert(changes.types.end(), last - first, ElementType::kTetrahedron);
+      const VertexId* vertices = mesh_.Vertices(CellId(first)).data();
+      changes.vertices.insert(changes.vertices.end(), vertices, vertices + 4 * size_t{last - first});
+    };
+    ForEachChange(EntityKind::kCell, begin, end, whole,
+                  [&](Slot slot) { VisitEach(EntityKind::kCell, slot, slot + 1, changes); });
+  }
+
+  void VisitEach(EntityKind kind, Slot begin, Slot end, ElementChanges& changes) {
     mesh_.changed(kind).ForEachSince(from_, begin, end, [&](Slot slot) {
       const EntityId id(kind, slot);
       if (!mesh_.IsLive(id) || !mesh_.IsElement(id)) return changes.removed.push_back(slot);
-      block.Add(slot, mesh_.Type(id), mesh_.VerticesOf(id));
+      const auto vertices = mesh_.VerticesOf(id);
+      changes.slots.push_back(slot);
+      changes.types.push_back(mesh_.Type(id));
+      changes.vertices.insert(changes.vertices.end(), vertices.begin(), vertices.end());
     });
-    block.Flush();
+  }
+
+  static void AppendRange(Slot begin, Slot end, std::vector<Slot>& slots) {
+    std::array<Slot, StampColumn::kPageSlots> range;
+    std::iota(range.begin(), range.begin() + (end - begin), begin);
+    slots.insert(slots.end(), range.begin(), range.begin() + (end - begin));
   }
 
   /// Rows of dead slots travel too, as the zeros that removal left: derived entities die unseen by a mirror.

@@ -6,6 +6,10 @@
 #include <string>
 
 #include "absl/strings/str_cat.h"
+#include "core/edit/apply_patch.h"
+#include "core/edit/collapse.h"
+#include "core/edit/split.h"
+#include "core/edit/swap.h"
 #include "core/mesh/spatial_order.h"
 
 namespace dynmesh {
@@ -13,6 +17,9 @@ namespace {
 
 /// Fewer new vertices of one edit take slots in the order they came, more along a Hilbert curve.
 constexpr size_t kFewVertices = 32;
+
+/// Of an operator, whatever it looks at.
+constexpr uint64_t kWorkOfItem = 10;
 
 absl::Status BadLength(absl::string_view what, size_t expected, size_t actual) {
   return InvalidArgument(reason::kBadArrayLength,
@@ -23,7 +30,10 @@ absl::Status BadLength(absl::string_view what, size_t expected, size_t actual) {
 class BatchApplier {
  public:
   BatchApplier(Mesh& mesh, const BatchOptions& options, BatchResult& result)
-      : mesh_(mesh), as_of_(std::min(options.as_of_revision, mesh.revision())), result_(result) {}
+      : mesh_(mesh),
+        as_of_(std::min(options.as_of_revision, mesh.revision())),
+        options_(options),
+        result_(result) {}
 
   absl::Status operator()(const AddVerticesEdit& edit) {
     const size_t count = edit.positions.size();
@@ -98,7 +108,197 @@ class BatchApplier {
     });
   }
 
+  absl::Status operator()(const SplitEdgesEdit& edit) {
+    DYNMESH_RETURN_IF_ERROR(CheckPlaces(edit.edges, edit.parameters, edit.positions));
+    return Operate({edit.edges.size(), 1}, edit.limits, [&](size_t i) -> absl::Status {
+      DYNMESH_ASSIGN_OR_RETURN(const EdgeId e, ResolveEdge(edit.edges, i));
+      SplitPlace place;
+      DYNMESH_RETURN_IF_ERROR(ReadPlace(edit, i, place));
+      place.origin = OriginOf(edit.edges, i);
+      if (!(place.parameter > 0 && place.parameter < 1))
+        return BadParameter(place.parameter, "between 0 and 1");
+      return PlanSplitEdge(mesh_, e, place, patch_);
+    });
+  }
+
+  absl::Status operator()(const CollapseEdgesEdit& edit) {
+    DYNMESH_RETURN_IF_ERROR(CheckPlaces(edit.edges, edit.parameters, edit.positions));
+    return Operate({edit.edges.size(), 0}, edit.limits, [&](size_t i) -> absl::Status {
+      DYNMESH_ASSIGN_OR_RETURN(const EdgeId e, ResolveEdge(edit.edges, i));
+      CollapsePlace place;
+      place.parameter = 0.5;
+      DYNMESH_RETURN_IF_ERROR(ReadPlace(edit, i, place));
+      place.origin = OriginOf(edit.edges, i);
+      if (!(place.parameter >= 0 && place.parameter <= 1))
+        return BadParameter(place.parameter, "from 0 to 1");
+      return PlanCollapseEdge(mesh_, e, place, patch_);
+    });
+  }
+
+  absl::Status operator()(const SwapEdgesEdit& edit) {
+    DYNMESH_RETURN_IF_ERROR(CheckNames(edit.edges));
+    return Operate({edit.edges.size(), 0}, edit.limits, [&](size_t i) -> absl::Status {
+      DYNMESH_ASSIGN_OR_RETURN(const EdgeId e, ResolveEdge(edit.edges, i));
+      return PlanSwapEdge(mesh_, e, patch_);
+    });
+  }
+
+  absl::Status operator()(const SwapFacesEdit& edit) {
+    return Operate({edit.faces.size(), 0}, edit.limits, [&](size_t i) -> absl::Status {
+      DYNMESH_RETURN_IF_ERROR(mesh_.CheckLive(FaceId(edit.faces[i]), as_of_));
+      return PlanSwapFace(mesh_, FaceId(edit.faces[i]), patch_);
+    });
+  }
+
+  absl::Status operator()(const SplitElementsEdit& edit) {
+    if (!IsEntityKind(edit.kind) || edit.kind == EntityKind::kVertex) return BadKind(edit.kind);
+    if (!edit.positions.empty() && edit.positions.size() != edit.elements.size()) {
+      return BadLength("positions", edit.elements.size(), edit.positions.size());
+    }
+    return Operate({edit.elements.size(), 1}, edit.limits, [&](size_t i) -> absl::Status {
+      const EntityId id(edit.kind, edit.elements[i]);
+      DYNMESH_RETURN_IF_ERROR(CheckElement(id));
+      absl::optional<Point> position;
+      if (!edit.positions.empty()) position = edit.positions[i];
+      DYNMESH_RETURN_IF_ERROR(CheckFinite(position));
+      return PlanSplitElement(mesh_, id, position, patch_);
+    });
+  }
+
  private:
+  // ---- Operators ----
+
+  /// Items of an operator, and the vertices that each is known to add, which later edits can name.
+  struct Items {
+    size_t count;
+    size_t new_vertices;
+  };
+
+  /// Plans, checks and carries out each item's patch, before the next one is planned.
+  template <typename Plan>
+  absl::Status Operate(const Items& items, const PatchLimits& limits, Plan plan) {
+    if (!(limits.min_quality >= 0 && limits.min_quality <= 1)) {
+      return InvalidArgument(reason::kBadArgument,
+                             absl::StrCat("a quality is from 0 to 1, not ", limits.min_quality),
+                             {{"field", "min_quality"}});
+    }
+    for (size_t i = 0; i < items.count; ++i) {
+      patch_.Clear();
+      absl::Status status = plan(i);
+      DYNMESH_RETURN_IF_ERROR(Charge());
+      if (status.ok()) status = CheckPatch(mesh_, patch_, limits);
+      if (status.ok()) status = ApplyPatch(mesh_, patch_, applied_);
+      if (status.ok()) {
+        DYNMESH_RETURN_IF_ERROR(Report(items));
+      } else if (options_.skip_refused && IsRefusal(status)) {
+        Skip(items, i, std::move(status));
+      } else {
+        return WithMetadata(status, "index", absl::StrCat(i));
+      }
+    }
+    return absl::OkStatus();
+  }
+
+  /// Whether the state of the mesh speaks against an item, and not what the caller wrote, or a limit.
+  static bool IsRefusal(const absl::Status& status) {
+    return absl::IsFailedPrecondition(status) || absl::IsNotFound(status);
+  }
+
+  /// Counts what was planned, so that few items cannot take long or fill the memory.
+  absl::Status Charge() {
+    work_ += kWorkOfItem + patch_.work;
+    result_.num_made += patch_.added.size();
+    if (work_ > options_.max_work) return LimitExceeded("max_batch_work", options_.max_work, work_);
+    if (result_.num_made > options_.max_made) {
+      return LimitExceeded("max_batch_items", options_.max_made, result_.num_made);
+    }
+    return absl::OkStatus();
+  }
+
+  /// Vertices that were not made keep their places, so that later ones can be counted on.
+  void Skip(const Items& items, uint32_t index, absl::Status status) {
+    EditResult& result = result_.results.back();
+    new_vertices_.insert(new_vertices_.end(), items.new_vertices, VertexId());
+    result.new_slots.insert(result.new_slots.end(), items.new_vertices, kNoSlot);
+    result.skipped.push_back(index);
+    if (result.refusals.size() < kMaxRefusals) result.refusals.push_back({index, std::move(status)});
+  }
+
+  absl::Status Report(const Items& items) {
+    EditResult& result = result_.results.back();
+    for (VertexId v : applied_.new_vertices) result.new_slots.push_back(v.slot());
+    const auto first = applied_.new_vertices.begin();
+    new_vertices_.insert(new_vertices_.end(), first, first + items.new_vertices);
+    if (options_.max_lineage == 0) return absl::OkStatus();
+    num_lineage_ += applied_.added.size();
+    if (num_lineage_ > options_.max_lineage) {
+      return LimitExceeded("max_lineage", options_.max_lineage, num_lineage_);
+    }
+    for (size_t k = 0; k < applied_.added.size(); ++k) {
+      result.lineage.push_back({applied_.added[k], patch_.removed[patch_.parents[k]]});
+    }
+    return absl::OkStatus();
+  }
+
+  static absl::Status CheckNames(const EdgeNames& edges) {
+    if (!edges.ids.empty() && !edges.ends.empty()) {
+      return InvalidArgument(reason::kBadArgument, "edges are named by ids or by their ends, not both",
+                             {{"field", "edges"}});
+    }
+    return edges.ends.size() % 2 == 0 ? absl::OkStatus()
+                                      : BadLength("ends of edges", edges.ends.size() + 1, edges.ends.size());
+  }
+
+  static absl::Status CheckPlaces(const EdgeNames& edges, absl::Span<const double> parameters,
+                                  absl::Span<const Point> positions) {
+    DYNMESH_RETURN_IF_ERROR(CheckNames(edges));
+    const size_t count = edges.size();
+    if (!parameters.empty() && parameters.size() != count)
+      return BadLength("parameters", count, parameters.size());
+    if (!positions.empty() && positions.size() != count)
+      return BadLength("positions", count, positions.size());
+    return absl::OkStatus();
+  }
+
+  static absl::Status BadParameter(double parameter, absl::string_view range) {
+    return InvalidArgument(reason::kBadArgument, absl::StrCat("a parameter is ", range, ", not ", parameter),
+                           {{"field", "parameters"}});
+  }
+
+  static absl::Status CheckFinite(const absl::optional<Point>& position) {
+    const bool finite = !position || (std::isfinite((*position)[0]) && std::isfinite((*position)[1]) &&
+                                      std::isfinite((*position)[2]));
+    return finite ? absl::OkStatus() : InvalidArgument(reason::kNonFinite, "a coordinate is not finite");
+  }
+
+  template <typename EdgesEdit, typename Place>
+  static absl::Status ReadPlace(const EdgesEdit& edit, size_t i, Place& place) {
+    if (!edit.parameters.empty()) place.parameter = edit.parameters[i];
+    if (!edit.positions.empty()) place.position = edit.positions[i];
+    return CheckFinite(place.position);
+  }
+
+  /// The end that was named first. REQUIRES: ResolveEdge succeeded.
+  VertexId OriginOf(const EdgeNames& edges, size_t i) const {
+    return edges.ends.empty() ? VertexId() : *Resolve(edges.ends[2 * i]);
+  }
+
+  absl::StatusOr<EdgeId> ResolveEdge(const EdgeNames& edges, size_t i) const {
+    if (!edges.ids.empty()) {
+      DYNMESH_RETURN_IF_ERROR(mesh_.CheckLive(EdgeId(edges.ids[i]), as_of_));
+      return EdgeId(edges.ids[i]);
+    }
+    DYNMESH_ASSIGN_OR_RETURN(const VertexId a, Resolve(edges.ends[2 * i]));
+    DYNMESH_ASSIGN_OR_RETURN(const VertexId b, Resolve(edges.ends[2 * i + 1]));
+    const EdgeId e = mesh_.FindEdge(a, b);
+    if (e.valid()) return e;
+    return MakeError(absl::StatusCode::kNotFound, reason::kUnknownEntity,
+                     absl::StrCat("no edge joins vertices ", a.slot(), " and ", b.slot()),
+                     {{"kind", "vertex"}, {"ids", JoinSlots({a.slot(), b.slot()})}});
+  }
+
+  // ---- Names ----
+
   /// Calls fn(0), fn(1), ... until one fails, and says which.
   template <typename Fn>
   absl::Status ForEach(size_t count, Fn fn) {
@@ -118,7 +318,10 @@ class BatchApplier {
                                             " vertices so far, there is no new vertex ", k),
                                {{"kind", "vertex"}, {"ids", absl::StrCat(slot)}});
       }
-      return new_vertices_[k];
+      if (new_vertices_[k].valid()) return new_vertices_[k];
+      return MakeError(absl::StatusCode::kNotFound, reason::kUnknownEntity,
+                       absl::StrCat("new vertex ", k, " was not made: its item was refused"),
+                       {{"kind", "vertex"}, {"ids", absl::StrCat(slot)}});
     }
     DYNMESH_RETURN_IF_ERROR(mesh_.CheckLive(VertexId(slot), as_of_));
     return VertexId(slot);
@@ -192,8 +395,13 @@ class BatchApplier {
 
   Mesh& mesh_;
   const int64_t as_of_;
+  const BatchOptions& options_;
   BatchResult& result_;
   std::vector<VertexId> new_vertices_;
+  size_t num_lineage_ = 0;
+  uint64_t work_ = 0;
+  Patch patch_;
+  AppliedPatch applied_;
 };
 
 absl::Status ApplyAll(Mesh& mesh, absl::Span<const Edit> edits, const BatchOptions& options,
@@ -219,22 +427,6 @@ absl::Status TryApplyAll(Mesh& mesh, absl::Span<const Edit> edits, const BatchOp
 }
 
 }  // namespace
-
-uint64_t NumItems(const Edit& edit) {
-  struct Counter {
-    uint64_t operator()(const AddVerticesEdit& e) const { return e.positions.size(); }
-    uint64_t operator()(const RemoveVerticesEdit& e) const { return e.vertices.size(); }
-    uint64_t operator()(const MoveVerticesEdit& e) const { return e.vertices.size(); }
-    uint64_t operator()(const AddElementsEdit& e) const {
-      return IsElementType(static_cast<int>(e.type)) ? e.vertices.size() / NumVertices(e.type)
-                                                     : e.vertices.size();
-    }
-    uint64_t operator()(const RemoveElementsEdit& e) const { return e.elements.size(); }
-    uint64_t operator()(const AddAttributeEdit&) const { return 1; }
-    uint64_t operator()(const SetAttributeEdit& e) const { return e.slots.size(); }
-  };
-  return std::visit(Counter(), edit);
-}
 
 absl::StatusOr<BatchResult> ApplyBatch(Mesh& mesh, absl::Span<const Edit> edits,
                                        const BatchOptions& options) {

@@ -4,56 +4,39 @@
 #include <cstdint>
 #include <limits>
 #include <string>
-#include <variant>
 #include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/types/span.h"
+#include "core/edit/edits.h"
 #include "core/mesh/mesh.h"
 
 namespace dynmesh {
 
-/// In a batch, vertex id kNewVertex | k means the k-th vertex that the batch has added so far.
-inline constexpr Slot kNewVertex = 0x80000000u;
-
-/// The edits of a batch, as values. Slots are what the caller read; positions are xyz.
-struct AddVerticesEdit {
-  std::vector<Point> positions;
-};
-struct RemoveVerticesEdit {
-  std::vector<Slot> vertices;
-};
-struct MoveVerticesEdit {
-  std::vector<Slot> vertices;
-  std::vector<Point> positions;
-};
-struct AddElementsEdit {
-  ElementType type = ElementType::kUnspecified;
-  std::vector<Slot> vertices;  ///< NumVertices(type) for each element
-};
-struct RemoveElementsEdit {
-  EntityKind kind = EntityKind::kCell;
-  std::vector<Slot> elements;
-};
-struct AddAttributeEdit {
-  AttributeSpec spec;
-};
-struct SetAttributeEdit {
-  AttributeSpec spec;  ///< must equal the column's
-  std::vector<Slot> slots;
-  std::vector<uint8_t> rows;
+/// An element that an operator made, and the one whose place it takes.
+struct Lineage {
+  EntityId element;
+  EntityId parent;
 };
 
-using Edit = std::variant<AddVerticesEdit, RemoveVerticesEdit, MoveVerticesEdit, AddElementsEdit,
-                          RemoveElementsEdit, AddAttributeEdit, SetAttributeEdit>;
+/// Why an item was skipped.
+struct Refusal {
+  uint32_t index;
+  absl::Status status;
+};
 
-/// How many vertices, elements or rows an edit names.
-uint64_t NumItems(const Edit& edit);
+/// So many refusals of an edit are told in full.
+inline constexpr size_t kMaxRefusals = 100;
 
 /// What one edit did.
 struct EditResult {
-  std::vector<Slot> new_slots;  ///< of the vertices or elements that it added, in order
+  /// Of the vertices or elements that it added, in order; of an operator: the vertices. A split has one for
+  /// each item, kNoSlot where that was skipped.
+  std::vector<Slot> new_slots;
+  std::vector<Lineage> lineage;   ///< of operators, with BatchOptions::max_lineage
+  std::vector<uint32_t> skipped;  ///< items that were refused, with BatchOptions::skip_refused
+  std::vector<Refusal> refusals;  ///< of the first kMaxRefusals of them
 };
 
 /// What a batch did or, for a dry run, would have done.
@@ -62,6 +45,7 @@ struct BatchResult {
   std::vector<EditResult> results;
   Checksum checksum;
   std::array<uint32_t, kNumEntityKinds> counts = {};
+  uint64_t num_made = 0;             ///< elements, by operators
   std::vector<EntityId> degenerate;  ///< elements added that name a vertex twice
   std::vector<EntityId> duplicate;   ///< elements added that equal one that was there
 };
@@ -71,14 +55,23 @@ struct BatchOptions {
   int64_t as_of_revision = std::numeric_limits<int64_t>::max();
   /// Roll back after success: the result is what would have been.
   bool dry_run = false;
+  /// Items of operators that are refused are reported and passed over. Other edits stay all or nothing.
+  bool skip_refused = false;
+  /// Tell which elements the operators made of which, as long as these are no more than so many; a batch that
+  /// makes more is refused with RESOURCE_EXHAUSTED. 0: do not tell.
+  size_t max_lineage = 0;
+  /// Elements that operators may make, and entities that they may look at, before the batch is refused with
+  /// RESOURCE_EXHAUSTED: one item may touch as many elements as the mesh has.
+  uint64_t max_made = std::numeric_limits<uint64_t>::max();
+  uint64_t max_work = std::numeric_limits<uint64_t>::max();
 };
 
 /// Applies `edits` in order to `mesh`, all or nothing, as one revision.
 ///
 /// An edit may use what an earlier one of the batch made: vertices as kNewVertex | k. An id of an occupant
 /// that the batch itself removed is refused; ids that it made cannot be named otherwise, because no slot
-/// freed in a batch is reused in it and as_of_revision lies before it. A face or edge that was an element, then derived,
-/// and is an element again counts as another one.
+/// freed in a batch is reused in it and as_of_revision lies before it. A face or edge that was an element,
+/// then derived, and is an element again counts as another one.
 ///
 /// Errors: those of Mesh's edits, with metadata "edit" (index in `edits`) and "index" (item of that edit).
 /// After an error or a dry run the mesh is as it was, to the last id and stamp.

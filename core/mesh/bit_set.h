@@ -24,6 +24,20 @@ class BitSet {
     return word < words_.size() && (words_[word] >> (slot % 64) & 1);
   }
 
+  /// Whether all slots of [begin, end) are members. Cost: (end - begin) / 64.
+  bool TestAll(Slot begin, Slot end) const {
+    if (begin >= end) return true;
+    if ((end - 1) / 64 >= words_.size()) return false;
+    for (size_t word = begin / 64; word <= (end - 1) / 64; ++word) {
+      const Slot base = word * 64;
+      uint64_t wanted = ~uint64_t{0};
+      if (base < begin) wanted &= ~uint64_t{0} << (begin - base);
+      if (end - base < 64) wanted &= (uint64_t{1} << (end - base)) - 1;
+      if ((words_[word] & wanted) != wanted) return false;
+    }
+    return true;
+  }
+
   void Set(Slot slot) {
     const size_t word = slot / 64;
     if (word >= words_.size()) Grow(word);

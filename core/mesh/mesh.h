@@ -1,6 +1,7 @@
 #ifndef DYNMESH_CORE_MESH_MESH_H_
 #define DYNMESH_CORE_MESH_MESH_H_
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <limits>
@@ -41,6 +42,19 @@ class OrientedFace {
 
  private:
   uint32_t packed_ = kNoSlot;
+};
+
+/// An element that is to be added.
+struct NewElement {
+  /// REQUIRES: vertices.size() == NumVertices(element_type).
+  NewElement(ElementType element_type, absl::Span<const VertexId> vertices) : type(element_type) {
+    std::copy(vertices.begin(), vertices.end(), ids.begin());
+  }
+  absl::Span<const VertexId> vertices() const { return absl::MakeConstSpan(ids.data(), NumVertices(type)); }
+  absl::Span<VertexId> mutable_vertices() { return absl::MakeSpan(ids.data(), NumVertices(type)); }
+
+  ElementType type;
+  std::array<VertexId, kMaxElementVertices> ids;
 };
 
 enum class DuplicatePolicy { kKeep, kRefuse };
@@ -220,6 +234,13 @@ class Mesh {
   /// Errors: those of RemoveElement, with metadata index; nothing was changed then.
   absl::Status RemoveElements(EntityKind kind, absl::Span<const Slot> elements);
 
+  /// Removes elements and adds others in their place: faces and edges that both use live on, with their ids
+  /// and attributes. Calls replaced(i, id) for each of `added`.
+  /// Errors: those of RemoveElement and AddElement. REQUIRES: no element is named twice; a batch is open, and
+  /// is rolled back, to a savepoint before at least, after an error.
+  absl::Status ReplaceElements(absl::Span<const EntityId> removed, absl::Span<const NewElement> added,
+                               absl::FunctionRef<void(size_t, EntityId)> replaced);
+
   // ---- Attributes ----
 
   const std::vector<AttributeColumn>& attributes() const { return attributes_; }
@@ -249,6 +270,10 @@ class Mesh {
   absl::Status Commit();
   /// Puts everything back to BeginBatch(), to the last id, stamp and list length. REQUIRES: a batch is open.
   void Rollback();
+  /// A point within the batch to which RollbackTo() puts everything back. REQUIRES: a batch is open.
+  using Savepoint = size_t;
+  Savepoint MakeSavepoint() const { return journal_.entries.size(); }
+  void RollbackTo(Savepoint savepoint);
 
   // ---- Upkeep ----
 

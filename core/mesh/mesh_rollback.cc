@@ -1,20 +1,26 @@
 // Undoing journal entries, last first.
 //
-// A slot that was freed in the batch has had no other occupant since, so the arrays still hold what stood there:
-// putting an entity back means linking it again.
+// A slot that was freed in the batch has had no other occupant since, so the arrays still hold what stood
+// there: putting an entity back means linking it again.
 
 #include "core/mesh/mesh.h"
 
 namespace dynmesh {
 
 void Mesh::Rollback() {
+  RollbackTo(0);
   batch_open_ = false;
-  while (!journal_.entries.empty()) {
+  journal_.Clear();
+}
+
+void Mesh::RollbackTo(Savepoint savepoint) {
+  batch_open_ = false;  // undoing is not recorded
+  while (journal_.entries.size() > savepoint) {
     const JournalEntry entry = journal_.entries.back();
     journal_.entries.pop_back();
     Undo(entry);
   }
-  journal_.Clear();
+  batch_open_ = true;
 }
 
 void Mesh::Undo(const JournalEntry& entry) {

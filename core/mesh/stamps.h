@@ -66,6 +66,14 @@ class StampColumn {
     }
   }
 
+  /// Whether all slots of [begin, end) have a stamp greater than `since`.
+  bool AreAllSince(Stamp since, Slot begin, Slot end) const {
+    if (end > stamps_.size()) return false;
+    Stamp oldest = kMaxStamp;
+    for (Slot slot = begin; slot < end; ++slot) oldest = std::min(oldest, stamps_[slot]);
+    return oldest > since;
+  }
+
   /// How many slots of [begin, end) have a stamp greater than `since`. Cost: as ForEachSince.
   size_t CountSince(Stamp since, Slot begin, Slot end) const {
     size_t count = 0;

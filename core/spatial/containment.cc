@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "core/spatial/vector.h"
+#include "core/mesh/vector.h"
 
 namespace dynmesh {
 namespace {

@@ -5,7 +5,7 @@
 #include <limits>
 #include <utility>
 
-#include "core/spatial/vector.h"
+#include "core/mesh/vector.h"
 
 namespace dynmesh {
 namespace {

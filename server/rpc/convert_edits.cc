@@ -66,6 +66,53 @@ absl::StatusOr<Edit> ToEdit(const v1::AttributeValues& message) {
   return edit;
 }
 
+// ---- Operators ----
+
+PatchLimits ToPatchLimits(const v1::OperatorLimits& message) {
+  return {.keep_orientation = !message.allow_inversion(), .min_quality = message.min_quality()};
+}
+
+absl::StatusOr<EdgeNames> ToEdgeNames(const v1::EdgeNames& message) {
+  EdgeNames names;
+  DYNMESH_ASSIGN_OR_RETURN(names.ids, ToArray<Slot>(message.ids(), "ids"));
+  DYNMESH_ASSIGN_OR_RETURN(names.ends, ToArray<Slot>(message.ends(), "ends"));
+  return names;
+}
+
+/// Of SplitEdges and CollapseEdges.
+template <typename EdgesEdit, typename Message>
+absl::StatusOr<Edit> ToEdgesEdit(const Message& message) {
+  EdgesEdit edit;
+  DYNMESH_ASSIGN_OR_RETURN(edit.edges, ToEdgeNames(message.edges()));
+  DYNMESH_ASSIGN_OR_RETURN(edit.parameters, ToArray<double>(message.parameters(), "parameters"));
+  DYNMESH_ASSIGN_OR_RETURN(edit.positions, ToArray<Point>(message.positions(), "positions"));
+  edit.limits = ToPatchLimits(message.limits());
+  return edit;
+}
+
+absl::StatusOr<Edit> ToEdit(const v1::SwapEdges& message) {
+  SwapEdgesEdit edit;
+  DYNMESH_ASSIGN_OR_RETURN(edit.edges, ToEdgeNames(message.edges()));
+  edit.limits = ToPatchLimits(message.limits());
+  return edit;
+}
+
+absl::StatusOr<Edit> ToEdit(const v1::SwapFaces& message) {
+  SwapFacesEdit edit;
+  DYNMESH_ASSIGN_OR_RETURN(edit.faces, ToArray<Slot>(message.ids(), "ids"));
+  edit.limits = ToPatchLimits(message.limits());
+  return edit;
+}
+
+absl::StatusOr<Edit> ToEdit(const v1::SplitElements& message) {
+  SplitElementsEdit edit;
+  DYNMESH_ASSIGN_OR_RETURN(edit.kind, ToEntityKind(message.kind(), "kind"));
+  DYNMESH_ASSIGN_OR_RETURN(edit.elements, ToArray<Slot>(message.ids(), "ids"));
+  DYNMESH_ASSIGN_OR_RETURN(edit.positions, ToArray<Point>(message.positions(), "positions"));
+  edit.limits = ToPatchLimits(message.limits());
+  return edit;
+}
+
 absl::StatusOr<Edit> ToEdit(const v1::Edit& message) {
   switch (message.kind_case()) {
     case v1::Edit::kAddVertices:
@@ -82,10 +129,44 @@ absl::StatusOr<Edit> ToEdit(const v1::Edit& message) {
       return ToEdit(message.add_attribute());
     case v1::Edit::kSetAttribute:
       return ToEdit(message.set_attribute());
+    case v1::Edit::kSplitEdges:
+      return ToEdgesEdit<SplitEdgesEdit>(message.split_edges());
+    case v1::Edit::kCollapseEdges:
+      return ToEdgesEdit<CollapseEdgesEdit>(message.collapse_edges());
+    case v1::Edit::kSwapEdges:
+      return ToEdit(message.swap_edges());
+    case v1::Edit::kSwapFaces:
+      return ToEdit(message.swap_faces());
+    case v1::Edit::kSplitElements:
+      return ToEdit(message.split_elements());
     case v1::Edit::KIND_NOT_SET:
       break;
   }
   return BadField("edits", "an edit says nothing, or is of a kind that this server does not know");
+}
+
+void FromLineage(absl::Span<const Lineage> lineage, v1::EditResult* message) {
+  std::vector<uint8_t> kinds;
+  std::vector<Slot> elements, parents;
+  for (const auto& [element, parent] : lineage) {
+    kinds.push_back(FromEntityKind(element.kind));
+    elements.push_back(element.slot);
+    parents.push_back(parent.slot);
+  }
+  message->set_element_kinds(FromArray(kinds));
+  message->set_element_ids(FromArray(elements));
+  message->set_parent_ids(FromArray(parents));
+}
+
+void FromEditResult(const EditResult& result, v1::EditResult* message) {
+  message->set_new_ids(FromArray(result.new_slots));
+  message->set_skipped(FromArray(result.skipped));
+  for (const Refusal& refusal : result.refusals) {
+    v1::SkippedItem* item = message->add_refusals();
+    item->set_index(refusal.index);
+    FromError(refusal.status, item->mutable_error());
+  }
+  FromLineage(result.lineage, message);
 }
 
 }  // namespace
@@ -109,13 +190,15 @@ ApplyOptions ToApplyOptions(const v1::ApplyEditsRequest& request) {
   if (request.has_if_revision()) options.if_revision = request.if_revision();
   options.request_id = request.request_id();
   options.validate_only = request.validate_only();
+  options.skip_refused = request.skip_refused();
+  options.report_lineage = request.report_lineage();
   return options;
 }
 
 void FromBatchResult(const BatchResult& result, v1::ApplyEditsResponse* response) {
   response->set_revision(result.revision);
   for (const EditResult& edit : result.results) {
-    response->add_results()->set_new_ids(FromArray(edit.new_slots));
+    FromEditResult(edit, response->add_results());
   }
   *response->mutable_checksum() = FromChecksum(result.checksum);
   KindCounts counts;

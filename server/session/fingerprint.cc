@@ -1,5 +1,6 @@
 #include "server/session/fingerprint.h"
 
+#include <bit>
 #include <variant>
 
 #include "xxhash.h"
@@ -30,6 +31,38 @@ struct EditVisitor {
     fingerprint.AddSpec(edit.spec);
     fingerprint.AddArray(edit.slots);
     fingerprint.AddArray(edit.rows);
+  }
+  void operator()(const SplitEdgesEdit& edit) { AddPlaced(edit); }
+  void operator()(const CollapseEdgesEdit& edit) { AddPlaced(edit); }
+  void operator()(const SwapEdgesEdit& edit) {
+    Add(edit.edges);
+    Add(edit.limits);
+  }
+  void operator()(const SwapFacesEdit& edit) {
+    fingerprint.AddArray(edit.faces);
+    Add(edit.limits);
+  }
+  void operator()(const SplitElementsEdit& edit) {
+    fingerprint.AddNumber(Dimension(edit.kind));
+    fingerprint.AddArray(edit.elements);
+    fingerprint.AddArray(edit.positions);
+    Add(edit.limits);
+  }
+
+  template <typename EdgesEdit>
+  void AddPlaced(const EdgesEdit& edit) {
+    Add(edit.edges);
+    fingerprint.AddArray(edit.parameters);
+    fingerprint.AddArray(edit.positions);
+    Add(edit.limits);
+  }
+  void Add(const EdgeNames& edges) {
+    fingerprint.AddArray(edges.ids);
+    fingerprint.AddArray(edges.ends);
+  }
+  void Add(const PatchLimits& limits) {
+    fingerprint.AddNumber(limits.keep_orientation);
+    fingerprint.AddNumber(std::bit_cast<uint64_t>(limits.min_quality));
   }
 };
 

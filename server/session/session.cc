@@ -34,19 +34,30 @@ uint64_t FingerprintOf(absl::Span<const Edit> edits, const ApplyOptions& options
   fingerprint.AddNumber(options.as_of_revision);
   fingerprint.AddNumber(options.if_revision.has_value());
   fingerprint.AddNumber(options.if_revision.value_or(0));
+  fingerprint.AddNumber(options.skip_refused);
+  fingerprint.AddNumber(options.report_lineage);
   for (const Edit& edit : edits) fingerprint.AddEdit(edit);
   return fingerprint.value();
 }
 
+constexpr size_t kRefusalBytes = 512;  ///< with its texts
+
+/// Entities that the operators of one batch may look at: some seconds, during which nobody else can edit.
+constexpr uint64_t kMaxBatchWork = 200'000'000;
+
 size_t BytesOf(const BatchResult& result) {
   size_t bytes = sizeof(result) + (result.degenerate.size() + result.duplicate.size()) * sizeof(EntityId);
-  for (const EditResult& edit : result.results) bytes += sizeof(edit) + edit.new_slots.size() * sizeof(Slot);
+  for (const EditResult& edit : result.results) {
+    bytes += sizeof(edit) + edit.new_slots.size() * sizeof(Slot) + edit.lineage.size() * sizeof(Lineage) +
+             edit.skipped.size() * sizeof(uint32_t) + edit.refusals.size() * kRefusalBytes;
+  }
   return bytes;
 }
 
 bool Grows(const Edit& edit) {
   return std::holds_alternative<AddVerticesEdit>(edit) || std::holds_alternative<AddElementsEdit>(edit) ||
-         std::holds_alternative<AddAttributeEdit>(edit) || std::holds_alternative<SetAttributeEdit>(edit);
+         std::holds_alternative<AddAttributeEdit>(edit) || std::holds_alternative<SetAttributeEdit>(edit) ||
+         IsOperator(edit);
 }
 
 /// Bytes that the rows which `edits` set would add. A row at a far slot takes a page, so that is much more
@@ -175,6 +186,10 @@ absl::StatusOr<Session::AnswerPtr> Session::ApplyLocked(absl::Span<const Edit> e
   BatchOptions batch;
   if (options.as_of_revision != 0) batch.as_of_revision = options.as_of_revision;
   batch.dry_run = options.validate_only;
+  batch.skip_refused = options.skip_refused;
+  if (options.report_lineage) batch.max_lineage = kMaxLineage;
+  batch.max_made = limits().max_batch_items;
+  batch.max_work = kMaxBatchWork;
   bool returned = false;
   absl::StatusOr<BatchResult> result = CatchExceptions([&] {
     absl::StatusOr<BatchResult> applied = ApplyBatch(mesh_, edits, batch);
@@ -187,6 +202,7 @@ absl::StatusOr<Session::AnswerPtr> Session::ApplyLocked(absl::Span<const Edit> e
     return gone_;
   }
   if (!result.ok()) return result.status();
+  items_since_check_ += result->num_made;
   if (!options.validate_only) Committed();
   return std::make_shared<const BatchResult>(*std::move(result));
 }

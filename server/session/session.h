@@ -35,7 +35,12 @@ struct ApplyOptions {
   absl::optional<int64_t> if_revision = absl::nullopt;
   std::string request_id = {};  ///< empty: none; ignored when validate_only
   bool validate_only = false;
+  bool skip_refused = false;    ///< items of operators
+  bool report_lineage = false;  ///< of at most kMaxLineage elements
 };
+
+/// So many elements that operators made can be told of in one answer, which is then some 4 MB.
+inline constexpr size_t kMaxLineage = 400'000;
 
 /// What a session holds while somebody reads it.
 struct SessionView {

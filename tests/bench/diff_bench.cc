@@ -2,6 +2,7 @@
 // is warm.
 
 #include <benchmark/benchmark.h>
+#include <malloc.h>
 
 #include <cstring>
 #include <memory>
@@ -52,10 +53,20 @@ void CopyInto(const Copy& copy, const std::vector<Bytes>& arrays) {
   benchmark::ClobberMemory();
 }
 
+/// Much memory, that is: what was freed would be warm, or not, as chance has it.
+constexpr size_t kMuch = 1 << 20;
+
 template <typename Task>
 void Register(const std::string& name, size_t bytes, Task task) {
   const auto run = [bytes, task](benchmark::State& state) {
-    for (auto _ : state) task();
+    for (auto _ : state) {
+      if (bytes >= kMuch) {
+        state.PauseTiming();
+        malloc_trim(0);
+        state.ResumeTiming();
+      }
+      task();
+    }
     state.SetBytesProcessed(state.iterations() * bytes);
   };
   benchmark::RegisterBenchmark(name.c_str(), run)->Unit(benchmark::kMicrosecond);

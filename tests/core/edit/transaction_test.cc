@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <random>
 #include <set>
 
@@ -315,6 +316,134 @@ TEST(TransactionTest, DegenerateAndDuplicateElementsAreReported) {
   ASSERT_EQ(result->duplicate.size(), 2u);
   EXPECT_EQ(result->duplicate[0], EntityId(CellId(2)));
   EXPECT_EQ(result->duplicate[1].kind, EntityKind::kFace);
+}
+
+// ---- Operators in a batch ----
+
+std::vector<Slot> EndsOf(const Mesh& mesh, EdgeId e) {
+  return {mesh.Vertices(e)[0].slot(), mesh.Vertices(e)[1].slot()};
+}
+
+TEST(TransactionOperatorsTest, ASplitEdgeCanBeNamedByTheVertexThatItGotInTheSameBatch) {
+  Mesh mesh = OneTet();
+  SplitEdgesEdit first, second;
+  first.edges.ends = {0, 1};
+  second.edges.ends = {0, kNewVertex | 0};
+  BatchOptions options;
+  options.max_lineage = 100;
+  const auto result = ApplyBatch(mesh, {first, second}, options);
+  ASSERT_TRUE(result.ok()) << result.status();
+  EXPECT_EQ(mesh.revision(), 2);
+  EXPECT_EQ(mesh.NumElements(EntityKind::kCell), 3u);
+  EXPECT_EQ(result->num_made, 4u);
+  ASSERT_EQ(result->results[0].lineage.size(), 2u);
+  EXPECT_EQ(result->results[0].lineage[0].parent, EntityId(CellId(0)));
+  EXPECT_THAT(result->results[1].new_slots, ElementsAre(5));
+  ExpectEqualsOracle(mesh, ModelOf(mesh));
+}
+
+TEST(TransactionOperatorsTest, ParametersCountFromTheEndThatIsNamedFirst) {
+  for (const auto& [a, b] : {std::pair<Slot, Slot>{0, 1}, {1, 0}}) {
+    Mesh mesh = Disk(6);
+    const Point origin = mesh.Position(VertexId(a)), other = mesh.Position(VertexId(b));
+    SplitEdgesEdit split;
+    split.edges.ends = {a, b};
+    split.parameters = {0.25};
+    ASSERT_TRUE(ApplyBatch(mesh, {split}, {}).ok());
+    for (int axis = 0; axis < 3; ++axis) {
+      EXPECT_DOUBLE_EQ(mesh.Position(VertexId(7))[axis], 0.75 * origin[axis] + 0.25 * other[axis]);
+    }
+    CollapseEdgesEdit collapse;
+    collapse.edges.ends = {a, 7};
+    collapse.limits.keep_orientation = false;
+    ASSERT_TRUE(ApplyBatch(mesh, {collapse}, {}).ok());
+    EXPECT_TRUE(mesh.IsLive(VertexId(a))) << a;
+    EXPECT_FALSE(mesh.IsLive(VertexId(7)));
+  }
+}
+
+TEST(TransactionOperatorsTest, RefusedItemsArePassedOverWhenAskedForAndElseEndTheBatch) {
+  Mesh mesh = OneTet();
+  const std::string before = Describe(mesh);
+  SwapEdgesEdit swap;  // on the boundary
+  swap.edges.ids = {0, 1};
+  SplitEdgesEdit split;
+  split.edges.ids = {0, 77, 1};
+  MoveVerticesEdit move{{kNewVertex | 2}, {{9, 9, 9}}};
+  const auto refused = ApplyBatch(mesh, {swap, split}, {});
+  EXPECT_EQ(ErrorReason(refused.status()), reason::kBoundary);
+  EXPECT_EQ(Metadata(refused.status(), "edit"), "0");
+  EXPECT_EQ(Metadata(refused.status(), "index"), "0");
+  EXPECT_EQ(Describe(mesh), before);
+  BatchOptions options;
+  options.skip_refused = true;
+  const auto result = ApplyBatch(mesh, {swap, split, move}, options);
+  ASSERT_TRUE(result.ok()) << result.status();
+  EXPECT_THAT(result->results[0].skipped, ElementsAre(0, 1));
+  EXPECT_EQ(ErrorReason(result->results[0].refusals[1].status), reason::kBoundary);
+  EXPECT_THAT(result->results[1].skipped, ElementsAre(1));
+  EXPECT_THAT(result->results[1].new_slots, ElementsAre(4, kNoSlot, 5));
+  EXPECT_EQ(mesh.Position(VertexId(5)), (Point{9, 9, 9}));
+  move.vertices = {kNewVertex | 1};
+  EXPECT_EQ(ErrorReason(ApplyBatch(mesh, {split, move}, options).status()), reason::kUnknownEntity);
+  ExpectEqualsOracle(mesh, ModelOf(mesh));
+}
+
+TEST(TransactionOperatorsTest, WhatTheCallerWroteWrongIsNeverPassedOver) {
+  Mesh mesh = OneTet();
+  const std::string before = Describe(mesh);
+  BatchOptions options;
+  options.skip_refused = true;
+  SplitEdgesEdit split;
+  const auto reason_of = [&](const Edit& edit) {
+    return ErrorReason(ApplyBatch(mesh, {edit}, options).status());
+  };
+  split.edges.ids = {0};
+  split.parameters = {0.5, 0.5};
+  EXPECT_EQ(reason_of(split), reason::kBadArrayLength);
+  split.parameters = {1};
+  EXPECT_EQ(reason_of(split), reason::kBadArgument);
+  split.parameters = {std::nan("")};
+  EXPECT_EQ(reason_of(split), reason::kBadArgument);
+  split.parameters = {};
+  split.positions = {{0, std::nan(""), 0}};
+  EXPECT_EQ(reason_of(split), reason::kNonFinite);
+  split.positions = {};
+  split.edges.ends = {0, 1};
+  EXPECT_EQ(reason_of(split), reason::kBadArgument);
+  split.edges = {{}, {0, 1, 2}};
+  EXPECT_EQ(reason_of(split), reason::kBadArrayLength);
+  split.edges = {{0}, {}};
+  split.limits.min_quality = 2;
+  EXPECT_EQ(reason_of(split), reason::kBadArgument);
+  EXPECT_EQ(reason_of(SplitElementsEdit{EntityKind::kVertex, {0}, {}, {}}), reason::kBadEntityKind);
+  EXPECT_EQ(Describe(mesh), before);
+}
+
+TEST(TransactionOperatorsTest, FewItemsCannotTakeWithoutEnd) {
+  Mesh mesh = TetWheel(200);
+  const std::string before = Describe(mesh);
+  SplitEdgesEdit split;
+  split.edges.ends = EndsOf(mesh, mesh.FindEdge(VertexId(0), VertexId(1)));
+  for (BatchOptions options :
+       {BatchOptions{.max_made = 399}, BatchOptions{.max_work = 200}, BatchOptions{.max_lineage = 399}}) {
+    EXPECT_EQ(ErrorReason(ApplyBatch(mesh, {split}, options).status()), reason::kLimitExceeded);
+    EXPECT_EQ(Describe(mesh), before);
+  }
+  EXPECT_TRUE(ApplyBatch(mesh, {split}, {.max_lineage = 400, .max_made = 400, .max_work = 10000}).ok());
+}
+
+TEST(TransactionOperatorsTest, ElementsThatWouldTurnOverAreRefusedUnlessAllowed) {
+  Mesh mesh = TetGrid(1, 1, 1);
+  CollapseEdgesEdit collapse;
+  collapse.edges.ends = {0, 1};
+  collapse.positions = {{5, 5, 5}};
+  const auto refused = ApplyBatch(mesh, {collapse}, {});
+  EXPECT_EQ(ErrorReason(refused.status()), reason::kWouldInvert);
+  EXPECT_EQ(Metadata(refused.status(), "kind"), "cell");
+  collapse.limits.keep_orientation = false;
+  EXPECT_TRUE(ApplyBatch(mesh, {collapse}, {}).ok());
+  ExpectEqualsOracle(mesh, ModelOf(mesh));
 }
 
 }  // namespace

@@ -31,7 +31,11 @@ TEST(BitSetTest, BehavesLikeASortedSet) {
     bits.Assign(slot, member);
     member ? (void)model.insert(slot) : (void)model.erase(slot);
     const Slot from = rng() % 300000;
+    const Slot first = rng() % 300, last = first + rng() % 150;
     const auto next = model.lower_bound(from);
+    size_t present = 0;
+    for (Slot s = first; s < last; ++s) present += model.count(s);
+    ASSERT_EQ(bits.TestAll(first, last), present == last - first);
     ASSERT_EQ(bits.Next(from), next == model.end() ? kNoSlot : *next);
     ASSERT_EQ(bits.Test(slot), member);
     ASSERT_EQ(bits.size(), model.size());
@@ -202,6 +206,22 @@ TEST_F(IncidenceListsTest, OneEntryTwiceIsRemovedOnceAtATime) {
   lists_.Remove(3, EdgeId(9));
   EXPECT_THAT(lists_.Of(3), ElementsAre(EdgeId(9)));
   EXPECT_THAT(lists_.Of(99), IsEmpty());
+}
+
+TEST(BitSetTest, ARangeIsWholeOnlyWithoutAGap) {
+  for (Slot begin : {0u, 1u, 63u, 64u, 100u}) {
+    for (Slot end : {begin, begin + 1, begin + 63, begin + 64, begin + 129}) {
+      BitSet set;
+      for (Slot slot = begin; slot < end; ++slot) set.Set(slot);
+      EXPECT_TRUE(set.TestAll(begin, end));
+      EXPECT_FALSE(set.TestAll(begin, end + 1));
+      for (Slot gap = begin; gap < end; ++gap) {
+        set.Clear(gap);
+        EXPECT_FALSE(set.TestAll(begin, end));
+        set.Set(gap);
+      }
+    }
+  }
 }
 
 TEST(EraseAscendingTest, RemovesOneEntryAndLeavesWhatStandsBehind) {

@@ -7,7 +7,7 @@
 #include <random>
 
 #include "core/spatial/ray.h"
-#include "core/spatial/vector.h"
+#include "core/mesh/vector.h"
 #include "tests/support/meshes.h"
 
 namespace dynmesh::testing {

@@ -15,7 +15,7 @@ from .checksum import Checksum
 from .client import Client, connect
 from .daemon import Daemon, launch
 from .delta import Delta
-from .edit import EditBatch, EditResult, Transaction
+from .edit import EditBatch, EditResult, Lineage, Refusal, Transaction
 from .edit_stream import EditStream
 from .errors import (
     AbortedError,
@@ -79,6 +79,7 @@ __all__ = [
     "InternalError",
     "InvalidArgumentError",
     "LaunchError",
+    "Lineage",
     "Located",
     "MeshWarning",
     "Mirror",
@@ -89,6 +90,7 @@ __all__ = [
     "OutOfRangeError",
     "PermissionDeniedError",
     "RayHits",
+    "Refusal",
     "ResourceExhaustedError",
     "Session",
     "SessionInfo",

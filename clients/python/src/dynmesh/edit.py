@@ -9,7 +9,7 @@ from types import TracebackType
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from .arrays import Ids, as_id_rows, as_integers, as_ids, as_points, concatenate, f64_bytes, from_bytes, u32_bytes
 from .checksum import Checksum
@@ -28,6 +28,44 @@ _batch_numbers = itertools.count(1)
 
 
 @dataclass(frozen=True)
+class Refusal:
+    """Why an item of an operator was passed over.
+
+    Attributes
+    ----------
+    index : int
+        The item, in the arrays that the operator was given.
+    reason : str
+        "LINK_CONDITION", "WOULD_INVERT", ...
+    message : str
+    metadata : dict of str to str
+        ``kind`` and ``ids`` of what stands in the way, among others.
+    """
+
+    index: int
+    reason: str
+    message: str
+    metadata: dict[str, str]
+
+
+@dataclass(frozen=True)
+class Lineage:
+    """Elements that an operator made, in order, and those whose places they took, which are of the same kinds.
+
+    Attributes
+    ----------
+    kinds : uint8[n]
+        Dimensions: 1 wire edges, 2 faces, 3 cells.
+    elements : uint32[n]
+    parents : uint32[n]
+    """
+
+    kinds: NDArray[np.uint8]
+    elements: Ids
+    parents: Ids
+
+
+@dataclass(frozen=True)
 class EditResult:
     """What a batch did or, if it was only validated, would have done.
 
@@ -39,6 +77,12 @@ class EditResult:
         For each edit the ids of what it added, in order.
     new_vertices : uint32[n]
         Ids of all vertices that the batch added, in order.
+    skipped : tuple of uint32[n]
+        For each edit the items that were passed over, with ``skip_refused``.
+    refusals : tuple of tuple of Refusal
+        For each edit why: of the first 100 of them.
+    lineage : tuple of Lineage
+        For each edit which elements it made of which, with ``report_lineage``.
     batch_number : int
         Tells the batch's handles from those of others.
     """
@@ -50,6 +94,9 @@ class EditResult:
     counts: Counts
     warnings: tuple[MeshWarning, ...]
     batch_number: int
+    skipped: tuple[Ids, ...] = ()
+    refusals: tuple[tuple[Refusal, ...], ...] = ()
+    lineage: tuple[Lineage, ...] = ()
 
     def resolve(self, vertices: ArrayLike) -> Ids:
         """Vertex ids for handles that `EditBatch.add_vertices` gave out; ids stay as they are.
@@ -95,11 +142,7 @@ class EditBatch:
             with `InvalidArgumentError` FOREIGN_HANDLE. `EditResult.resolve` turns them into ids.
         """
         points = as_points(positions)
-        first = self._number << 32 | NEW_VERTEX + self._num_new_vertices
-        self._adds_vertices.append(len(self._edits))
-        self._num_new_vertices += len(points)
-        self._append(add_vertices=edits_pb2.AddVertices(positions=f64_bytes(points)))
-        return np.arange(first, first + len(points), dtype=np.int64)
+        return self._append_vertices(len(points), add_vertices=edits_pb2.AddVertices(positions=f64_bytes(points)))
 
     def remove_vertices(self, ids: ArrayLike) -> int:
         """Removes vertices (uint32[n]) that have no incident edges any more; returns the edit's index."""
@@ -159,6 +202,126 @@ class EditBatch:
         message = types_pb2.AttributeValues(spec=spec, ids=u32_bytes(slots), values=values_bytes(rows))
         return self._append(set_attribute=message)
 
+    def split_edges(
+        self,
+        edges: ArrayLike | None = None,
+        *,
+        ends: ArrayLike | None = None,
+        parameters: ArrayLike | None = None,
+        positions: ArrayLike | None = None,
+        allow_inversion: bool = False,
+        min_quality: float = 0.0,
+    ) -> Ids:
+        """Puts a vertex on each edge and replaces all elements at it.
+
+        Wires, triangles and tetrahedra become two, quads three triangles, other cells tetrahedra and pyramids.
+
+        Parameters
+        ----------
+        edges : uint32[n], optional
+            Ids of edges.
+        ends : uint32[n, 2], optional
+            In place of `edges`: their vertices, ids or handles of this batch.
+        parameters : float[n] or float, optional
+            Where on the edge, between 0 (its first vertex) and 1. Default 0.5.
+        positions : float[n, 3], optional
+            Where else the vertices go.
+        allow_inversion : bool
+            Let elements be flat, or turned over against those whose place they take.
+        min_quality : float
+            Least quality of each new element, 0 to 1 (regular).
+
+        Returns
+        -------
+        int64[n]
+            Handles of the new vertices, as of `add_vertices`. For items that are passed over with
+            ``skip_refused``, `EditResult.resolve` gives 0xffffffff.
+        """
+        names, count = self._edges(edges, ends)
+        message = edits_pb2.SplitEdges(
+            edges=names,
+            parameters=_parameters(parameters, count),
+            positions=_positions(positions, count),
+            limits=_limits(allow_inversion, min_quality),
+        )
+        return self._append_vertices(count, split_edges=message)
+
+    def collapse_edges(
+        self,
+        edges: ArrayLike | None = None,
+        *,
+        ends: ArrayLike | None = None,
+        parameters: ArrayLike | None = None,
+        positions: ArrayLike | None = None,
+        allow_inversion: bool = False,
+        min_quality: float = 0.0,
+    ) -> int:
+        """Draws each edge together; returns the edit's index. The nearer end keeps its id, the other one goes.
+
+        Parameters are those of `split_edges`; ``parameters`` may also be 0 or 1, and by default is 0.5, where the
+        first vertex keeps its id.
+        """
+        names, count = self._edges(edges, ends)
+        message = edits_pb2.CollapseEdges(
+            edges=names,
+            parameters=_parameters(parameters, count),
+            positions=_positions(positions, count),
+            limits=_limits(allow_inversion, min_quality),
+        )
+        return self._append(collapse_edges=message)
+
+    def swap_edges(
+        self,
+        edges: ArrayLike | None = None,
+        *,
+        ends: ArrayLike | None = None,
+        allow_inversion: bool = False,
+        min_quality: float = 0.0,
+    ) -> int:
+        """Flips edges between two triangles, and removes edges inside of tetrahedra (3-2, 4-4 and beyond).
+
+        Parameters are those of `split_edges`. Returns the edit's index.
+        """
+        names, _ = self._edges(edges, ends)
+        message = edits_pb2.SwapEdges(edges=names, limits=_limits(allow_inversion, min_quality))
+        return self._append(swap_edges=message)
+
+    def swap_faces(self, faces: ArrayLike, *, allow_inversion: bool = False, min_quality: float = 0.0) -> int:
+        """Replaces faces (uint32[n]) between two tetrahedra by edges (2-3); returns the edit's index."""
+        limits = _limits(allow_inversion, min_quality)
+        return self._append(swap_faces=edits_pb2.SwapFaces(ids=u32_bytes(as_ids(faces)), limits=limits))
+
+    def split_elements(
+        self,
+        kind: KindLike,
+        elements: ArrayLike,
+        *,
+        positions: ArrayLike | None = None,
+        allow_inversion: bool = False,
+        min_quality: float = 0.0,
+    ) -> Ids:
+        """Puts a vertex into each element and replaces it by one for each of its faces (of a face: edges).
+
+        Parameters
+        ----------
+        elements : uint32[n]
+        positions : float[n, 3], optional
+            Where the vertices go; by default the means of the elements' vertices.
+
+        Returns
+        -------
+        int64[n]
+            Handles of the new vertices, as of `split_edges`.
+        """
+        slots = as_ids(elements)
+        message = edits_pb2.SplitElements(
+            kind=int(as_kind(kind)),
+            ids=u32_bytes(slots),
+            positions=_positions(positions, len(slots)),
+            limits=_limits(allow_inversion, min_quality),
+        )
+        return self._append_vertices(len(slots), split_elements=message)
+
     def edits(self) -> list[edits_pb2.Edit]:
         """The edits so far, as messages."""
         return list(self._edits)
@@ -174,7 +337,26 @@ class EditBatch:
             counts=counts_from_proto(reply.counts),
             warnings=tuple(warning_from_proto(w) for w in reply.warnings),
             batch_number=self._number,
+            skipped=tuple(from_bytes(result.skipped, "<u4") for result in reply.results),
+            refusals=tuple(tuple(map(_refusal, result.refusals)) for result in reply.results),
+            lineage=tuple(map(_lineage, reply.results)),
         )
+
+    def _append_vertices(self, count: int, **kind: Any) -> Ids:
+        """Appends an edit that adds vertices; returns their handles."""
+        first = self._number << 32 | NEW_VERTEX + self._num_new_vertices
+        self._adds_vertices.append(self._append(**kind))
+        self._num_new_vertices += count
+        return np.arange(first, first + count, dtype=np.int64)
+
+    def _edges(self, edges: ArrayLike | None, ends: ArrayLike | None) -> tuple[edits_pb2.EdgeNames, int]:
+        if (edges is None) == (ends is None):
+            raise InvalidArgumentError("name edges by their ids or by their ends", reason="BAD_ARGUMENT")
+        if edges is not None:
+            slots = as_ids(edges)
+            return edits_pb2.EdgeNames(ids=u32_bytes(slots)), len(slots)
+        rows = as_id_rows(self._wire(ends), 2, "ends of edges")
+        return edits_pb2.EdgeNames(ends=u32_bytes(rows)), len(rows)
 
     def _wire(self, vertices: ArrayLike) -> ArrayLike:
         return _to_wire(vertices, self._number)
@@ -251,6 +433,37 @@ def _to_wire(vertices: ArrayLike, batch_number: int) -> Any:
             metadata={"index": str(index)},
         )
     return np.where(handles, array & _WIRE_MASK, array)
+
+
+def _limits(allow_inversion: bool, min_quality: float) -> edits_pb2.OperatorLimits:
+    return edits_pb2.OperatorLimits(allow_inversion=allow_inversion, min_quality=min_quality)
+
+
+def _parameters(parameters: ArrayLike | None, count: int) -> bytes:
+    if parameters is None:
+        return b""
+    numbers = np.asarray(parameters, dtype=np.float64)
+    if numbers.ndim == 0:
+        numbers = np.full(count, numbers)
+    _check_same_length("parameters", numbers.size, count)
+    return f64_bytes(numbers)
+
+
+def _positions(positions: ArrayLike | None, count: int) -> bytes:
+    if positions is None:
+        return b""
+    points = as_points(positions)
+    _check_same_length("positions", len(points), count)
+    return f64_bytes(points)
+
+
+def _refusal(item: edits_pb2.SkippedItem) -> Refusal:
+    return Refusal(item.index, item.error.reason, item.error.message, dict(item.error.metadata))
+
+
+def _lineage(result: edits_pb2.EditResult) -> Lineage:
+    kinds = from_bytes(result.element_kinds, "u1")
+    return Lineage(kinds - 1, from_bytes(result.element_ids, "<u4"), from_bytes(result.parent_ids, "<u4"))
 
 
 def _check_same_length(what: str, length: int, wanted: int) -> None:

@@ -174,6 +174,8 @@ class Session(SessionReader):
         if_revision: int | None = None,
         request_id: str | None = None,
         validate_only: bool = False,
+        skip_refused: bool = False,
+        report_lineage: bool = False,
         timeout: float | None = None,
     ) -> Transaction:
         """A batch of edits, sent as one revision when its ``with`` block ends without an exception.
@@ -191,12 +193,19 @@ class Session(SessionReader):
             client itself may repeat the call when the connection breaks.
         validate_only : bool
             Check, and compute the result, but change nothing.
+        skip_refused : bool
+            Pass over items of splits, collapses and swaps that the mesh refuses: see `EditResult.skipped`.
+            Other edits stay all or nothing.
+        report_lineage : bool
+            Tell which elements splits, collapses and swaps made of which: see `EditResult.lineage`.
         """
         options = {
             "as_of_revision": as_of_revision,
             "if_revision": if_revision,
             "request_id": request_id,
             "validate_only": validate_only,
+            "skip_refused": skip_refused,
+            "report_lineage": report_lineage,
         }
         return Transaction(lambda batch: self.apply(batch, timeout=timeout, **options))  # type: ignore[arg-type]
 
@@ -208,6 +217,8 @@ class Session(SessionReader):
         if_revision: int | None = None,
         request_id: str | None = None,
         validate_only: bool = False,
+        skip_refused: bool = False,
+        report_lineage: bool = False,
         timeout: float | None = None,
     ) -> EditResult:
         """Sends a batch that was collected without a ``with`` block. Parameters as in `edit`."""
@@ -218,6 +229,8 @@ class Session(SessionReader):
             if_revision=None if if_revision is None else as_int64(if_revision, "if_revision"),
             request_id=request_id or _new_request_id(),
             validate_only=validate_only,
+            skip_refused=skip_refused,
+            report_lineage=report_lineage,
         )
         return batch.read(self._caller.unary(self._edits.ApplyEdits, request, timeout, repeatable=True))
 

@@ -1,7 +1,7 @@
-#ifndef DYNMESH_CORE_SPATIAL_VECTOR_H_
-#define DYNMESH_CORE_SPATIAL_VECTOR_H_
+#ifndef DYNMESH_CORE_MESH_VECTOR_H_
+#define DYNMESH_CORE_MESH_VECTOR_H_
 
-#include "core/mesh/mesh.h"
+#include "core/mesh/checksum.h"
 
 /// The few operations on vectors that geometry here takes.
 namespace dynmesh {
@@ -18,4 +18,4 @@ inline Point Cross(const Point& a, const Point& b) {
 
 }  // namespace dynmesh
 
-#endif  // DYNMESH_CORE_SPATIAL_VECTOR_H_
+#endif  // DYNMESH_CORE_MESH_VECTOR_H_

@@ -1,0 +1,136 @@
+#include "core/edit/apply_patch.h"
+
+#include <algorithm>
+#include <cstring>
+
+#include "absl/strings/str_cat.h"
+
+namespace dynmesh {
+namespace {
+
+int64_t EulerCharacteristic(const Mesh& mesh) {
+  int64_t sum = 0;
+  for (EntityKind kind : kEntityKinds)
+    sum += (Dimension(kind) % 2 == 0 ? 1 : -1) * int64_t{mesh.NumLive(kind)};
+  return sum;
+}
+
+/// Rows that outlive the entities which had them.
+class SavedRows {
+ public:
+  SavedRows(const Mesh& mesh, absl::Span<const EntityId> entities) {
+    for (size_t column = 0; column < mesh.attributes().size(); ++column) {
+      for (size_t i = 0; i < entities.size(); ++i) {
+        if (mesh.attributes()[column].spec().kind == entities[i].kind)
+          Save(mesh, column, i, entities[i].slot);
+      }
+    }
+  }
+
+  /// Gives `to`, of any kind, the rows of the i-th entity, if that is of the same kind.
+  absl::Status CopyTo(Mesh& mesh, size_t i, EntityId to) const {
+    for (const Row& row : rows_) {
+      if (row.entity != i || mesh.attributes()[row.column].spec().kind != to.kind) continue;
+      DYNMESH_RETURN_IF_ERROR(mesh.SetAttribute(row.column, to.slot, row.bytes));
+    }
+    return absl::OkStatus();
+  }
+
+ private:
+  struct Row {
+    int column;
+    size_t entity;
+    std::vector<uint8_t> bytes;
+  };
+
+  void Save(const Mesh& mesh, int column, size_t entity, Slot slot) {
+    const auto bytes = mesh.attributes()[column].Row(slot);
+    const bool zero = std::all_of(bytes.begin(), bytes.end(), [](uint8_t byte) { return byte == 0; });
+    if (!zero) rows_.push_back({column, entity, {bytes.begin(), bytes.end()}});
+  }
+
+  std::vector<Row> rows_;
+};
+
+std::vector<uint8_t> BlendRows(const AttributeColumn& column, const Blend& blend) {
+  const size_t heaviest =
+      std::max_element(blend.weights.begin(), blend.weights.end()) - blend.weights.begin();
+  const auto copied = column.Row(blend.vertices[heaviest].slot());
+  std::vector<uint8_t> row(copied.begin(), copied.end());
+  if (column.spec().type != AttributeType::kFloat64) return row;
+  std::vector<double> sum(column.spec().components);
+  for (size_t i = 0; i < blend.vertices.size(); ++i) {
+    const auto bytes = column.Row(blend.vertices[i].slot());
+    for (size_t k = 0; k < sum.size(); ++k) {
+      double value;
+      std::memcpy(&value, &bytes[k * sizeof(value)], sizeof(value));
+      sum[k] += blend.weights[i] * value;
+    }
+  }
+  std::memcpy(row.data(), sum.data(), row.size());
+  return row;
+}
+
+absl::Status BlendAttributes(Mesh& mesh, const Blend& blend, VertexId to) {
+  if (blend.vertices.empty()) return absl::OkStatus();
+  for (size_t column = 0; column < mesh.attributes().size(); ++column) {
+    if (mesh.attributes()[column].spec().kind != EntityKind::kVertex) continue;
+    DYNMESH_RETURN_IF_ERROR(
+        mesh.SetAttribute(column, to.slot(), BlendRows(mesh.attributes()[column], blend)));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status PlaceVertices(Mesh& mesh, const Patch& patch, AppliedPatch& applied) {
+  for (const Patch::NewVertex& vertex : patch.new_vertices) {
+    DYNMESH_ASSIGN_OR_RETURN(const VertexId v, mesh.AddVertex(vertex.position));
+    DYNMESH_RETURN_IF_ERROR(BlendAttributes(mesh, vertex.blend, v));
+    applied.new_vertices.push_back(v);
+  }
+  for (const Patch::Move& move : patch.moves) {
+    DYNMESH_RETURN_IF_ERROR(mesh.MoveVertex(move.vertex, move.position));
+    DYNMESH_RETURN_IF_ERROR(BlendAttributes(mesh, move.blend, move.vertex));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status ReplaceElements(Mesh& mesh, const Patch& patch, AppliedPatch& applied) {
+  std::vector<NewElement> added = patch.added;
+  for (NewElement& element : added) {
+    for (VertexId& v : element.mutable_vertices()) {
+      if (v.slot() & kNewVertex) v = applied.new_vertices[v.slot() & ~kNewVertex];
+    }
+  }
+  const SavedRows rows(mesh, patch.removed);
+  applied.added.resize(added.size());
+  DYNMESH_RETURN_IF_ERROR(
+      mesh.ReplaceElements(patch.removed, added, [&](size_t i, EntityId id) { applied.added[i] = id; }));
+  for (size_t i = 0; i < added.size(); ++i) {
+    DYNMESH_RETURN_IF_ERROR(rows.CopyTo(mesh, patch.parents[i], applied.added[i]));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status Apply(Mesh& mesh, const Patch& patch, AppliedPatch& applied) {
+  const int64_t before = EulerCharacteristic(mesh);
+  DYNMESH_RETURN_IF_ERROR(PlaceVertices(mesh, patch, applied));
+  DYNMESH_RETURN_IF_ERROR(ReplaceElements(mesh, patch, applied));
+  for (VertexId v : patch.removed_vertices) DYNMESH_RETURN_IF_ERROR(mesh.RemoveVertex(v));
+  const int64_t after = EulerCharacteristic(mesh);
+  if (after == before) return absl::OkStatus();
+  return FailedPrecondition(reason::kWouldChangeTopology,
+                            absl::StrCat("the Euler characteristic would change by ", after - before));
+}
+
+}  // namespace
+
+absl::Status ApplyPatch(Mesh& mesh, const Patch& patch, AppliedPatch& applied) {
+  const Mesh::Savepoint savepoint = mesh.MakeSavepoint();
+  applied.new_vertices.clear();
+  applied.added.clear();
+  absl::Status status = Apply(mesh, patch, applied);
+  if (!status.ok()) mesh.RollbackTo(savepoint);
+  return status;
+}
+
+}  // namespace dynmesh

@@ -1,0 +1,29 @@
+#ifndef DYNMESH_CORE_EDIT_APPLY_PATCH_H_
+#define DYNMESH_CORE_EDIT_APPLY_PATCH_H_
+
+#include <vector>
+
+#include "absl/status/status.h"
+#include "core/edit/patch.h"
+#include "core/mesh/mesh.h"
+
+namespace dynmesh {
+
+/// What a patch became: ids of its new vertices and elements, in its order.
+struct AppliedPatch {
+  std::vector<VertexId> new_vertices;
+  std::vector<EntityId> added;
+};
+
+/// Carries out a patch. Faces and edges that old and new elements share live on. New elements take the
+/// attributes of those whose place they take, new and moved vertices those of their blend: floating-point
+/// numbers weighed, others copied from the vertex that weighs most.
+///
+/// Errors: those of Mesh's edits; FAILED_PRECONDITION WOULD_CHANGE_TOPOLOGY when the Euler characteristic
+/// (vertices - edges + faces - cells) would change. Nothing has changed then.
+/// REQUIRES: a batch is open; the mesh is as it was when the patch was planned. Cost: linear in the patch.
+absl::Status ApplyPatch(Mesh& mesh, const Patch& patch, AppliedPatch& applied);
+
+}  // namespace dynmesh
+
+#endif  // DYNMESH_CORE_EDIT_APPLY_PATCH_H_

@@ -1,0 +1,109 @@
+#include "core/edit/check_patch.h"
+
+#include <algorithm>
+#include <array>
+
+#include "absl/strings/str_cat.h"
+#include "core/edit/geometry.h"
+#include "core/edit/star.h"
+#include "core/mesh/vector.h"
+
+namespace dynmesh {
+namespace {
+
+/// Points of one element.
+struct Shape {
+  ElementType type;
+  std::array<Point, kMaxElementVertices> points;
+
+  absl::Span<const Point> span() const { return absl::MakeConstSpan(points.data(), NumVertices(type)); }
+};
+
+class PatchChecker {
+ public:
+  PatchChecker(const Mesh& mesh, const Patch& patch, const PatchLimits& limits)
+      : mesh_(mesh), patch_(patch), limits_(limits) {}
+
+  absl::Status CheckAdded() const {
+    for (size_t i = 0; i < patch_.added.size(); ++i) {
+      const NewElement& element = patch_.added[i];
+      DYNMESH_RETURN_IF_ERROR(
+          Check(patch_.removed[patch_.parents[i]], After(element.type, element.vertices())));
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status CheckMoved() const {
+    for (const Patch::Move& move : patch_.moves) {
+      absl::Status status;
+      ForEachElement(StarOf(mesh_, move.vertex), [&](EntityId id) {
+        const auto& removed = patch_.removed;
+        if (!status.ok() || std::find(removed.begin(), removed.end(), id) != removed.end()) return;
+        status = Check(id, After(mesh_.Type(id), mesh_.VerticesOf(id)));
+      });
+      DYNMESH_RETURN_IF_ERROR(status);
+    }
+    return absl::OkStatus();
+  }
+
+ private:
+  Shape After(ElementType type, absl::Span<const VertexId> vertices) const {
+    Shape shape{type, {}};
+    for (size_t k = 0; k < vertices.size(); ++k) shape.points[k] = PositionAfter(mesh_, patch_, vertices[k]);
+    return shape;
+  }
+
+  Shape Before(EntityId id) const {
+    Shape shape{mesh_.Type(id), {}};
+    const auto vertices = mesh_.VerticesOf(id);
+    for (size_t k = 0; k < vertices.size(); ++k) shape.points[k] = mesh_.Position(vertices[k]);
+    return shape;
+  }
+
+  absl::Status Check(EntityId parent, const Shape& child) const {
+    if (limits_.keep_orientation && Turns(Before(parent), child)) {
+      return Refuse(
+          reason::kWouldInvert,
+          absl::StrCat("the ", ElementTypeName(child.type), " in place of ", EntityKindName(parent.kind), " ",
+                       parent.slot, " would be flat or turned over"),
+          parent.kind, {parent.slot});
+    }
+    if (limits_.min_quality > 0 && !(Quality(child.type, child.span()) >= limits_.min_quality)) {
+      return Refuse(
+          reason::kWouldDegrade,
+          absl::StrCat("the ", ElementTypeName(child.type), " in place of ", EntityKindName(parent.kind), " ",
+                       parent.slot, " would have a quality of ", Quality(child.type, child.span())),
+          parent.kind, {parent.slot});
+    }
+    return absl::OkStatus();
+  }
+
+  static bool Turns(const Shape& parent, const Shape& child) {
+    switch (KindOf(child.type)) {
+      case EntityKind::kCell: {
+        const int before = Orientation(parent.type, parent.span());
+        return before != 0 && Orientation(child.type, child.span()) != before;
+      }
+      case EntityKind::kFace: {
+        const Point before = AreaVector(parent.type, parent.span());
+        return Dot(before, before) > 0 && !(Dot(before, AreaVector(child.type, child.span())) > 0);
+      }
+      default:
+        return false;
+    }
+  }
+
+  const Mesh& mesh_;
+  const Patch& patch_;
+  const PatchLimits& limits_;
+};
+
+}  // namespace
+
+absl::Status CheckPatch(const Mesh& mesh, const Patch& patch, const PatchLimits& limits) {
+  const PatchChecker checker(mesh, patch, limits);
+  DYNMESH_RETURN_IF_ERROR(checker.CheckAdded());
+  return checker.CheckMoved();
+}
+
+}  // namespace dynmesh

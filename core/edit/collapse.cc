@@ -1,0 +1,231 @@
+#include "core/edit/collapse.h"
+
+#include <algorithm>
+#include <array>
+
+#include "absl/strings/str_cat.h"
+#include "core/edit/cone.h"
+#include "core/edit/star.h"
+#include "core/mesh/vector.h"
+
+namespace dynmesh {
+namespace {
+
+/// Up to four vertices of a face after a collapse.
+struct Polygon {
+  std::array<VertexId, kMaxFaceVertices> vertices;
+  size_t size = 0;
+
+  absl::Span<const VertexId> span() const { return absl::MakeConstSpan(vertices.data(), size); }
+};
+
+/// What the collapse of one edge ties together, and whether anything else would merge.
+class LinkCondition {
+ public:
+  LinkCondition(const Mesh& mesh, VertexId kept, VertexId gone) : mesh_(mesh), kept_(kept), gone_(gone) {}
+
+  absl::Status Check(EdgeId e) const {
+    if (mesh_.IsOnBoundary(kept_) && mesh_.IsOnBoundary(gone_) && !mesh_.IsOnBoundary(e)) {
+      return Refuse(reason::kBoundary,
+                    absl::StrCat("edge ", e.slot(), " runs inside from boundary to boundary"),
+                    EntityKind::kEdge, {e.slot()});
+    }
+    for (EdgeId other : mesh_.IncidentEdges(gone_)) {
+      DYNMESH_RETURN_IF_ERROR(CheckEdge(other));
+      for (FaceId f : mesh_.IncidentFaces(other)) DYNMESH_RETURN_IF_ERROR(CheckFace(f));
+    }
+    return absl::OkStatus();
+  }
+
+ private:
+  VertexId OtherEnd(EdgeId e) const {
+    const auto ends = mesh_.Vertices(e);
+    return ends[0] == gone_ ? ends[1] : ends[0];
+  }
+
+  /// An edge of `gone` may merge with one of `kept` only across a triangle of the three.
+  absl::Status CheckEdge(EdgeId of_gone) const {
+    const VertexId c = OtherEnd(of_gone);
+    if (c == kept_) return absl::OkStatus();
+    const EdgeId of_kept = mesh_.FindEdge(kept_, c);
+    if (!of_kept.valid()) return absl::OkStatus();
+    const FaceId between = mesh_.FindFace({kept_, gone_, c});
+    const auto refuse = [&](absl::string_view why) {
+      return Refuse(reason::kLinkCondition, absl::StrCat("vertex ", c.slot(), " ", why), EntityKind::kVertex,
+                    {c.slot()});
+    };
+    if (!between.valid()) return refuse("is adjacent to both ends, and no triangle lies between");
+    if (mesh_.IsElement(of_kept) || mesh_.IsElement(of_gone)) {
+      return Refuse(reason::kElementInTheWay, "a wire edge would merge with another edge", EntityKind::kEdge,
+                    {of_kept.slot(), of_gone.slot()});
+    }
+    const bool solid = !mesh_.IncidentCells(between).empty();
+    if (solid && mesh_.IsOnBoundary(of_kept) && mesh_.IsOnBoundary(of_gone) && !mesh_.IsOnBoundary(between)) {
+      return refuse("is joined to both ends along the boundary, round a triangle that lies inside");
+    }
+    return absl::OkStatus();
+  }
+
+  /// A face of `gone` may merge with one of `kept` only across a cell of both.
+  absl::Status CheckFace(FaceId of_gone) const {
+    const auto vertices = mesh_.Vertices(of_gone);
+    if (Contains(vertices, kept_)) return absl::OkStatus();
+    std::array<VertexId, kMaxFaceVertices> moved;
+    std::replace_copy(vertices.begin(), vertices.end(), moved.begin(), gone_, kept_);
+    const FaceId of_kept = mesh_.FindFace(absl::MakeConstSpan(moved.data(), vertices.size()));
+    if (!of_kept.valid()) return absl::OkStatus();
+    const auto cells = mesh_.IncidentCells(of_kept);
+    for (CellId c : mesh_.IncidentCells(of_gone)) {
+      if (Contains(mesh_.Vertices(c), kept_) && std::find(cells.begin(), cells.end(), c) != cells.end()) {
+        return CheckDangling(of_kept, of_gone);
+      }
+    }
+    return Refuse(reason::kLinkCondition,
+                  absl::StrCat("faces ", of_gone.slot(), " and ", of_kept.slot(),
+                               " would merge, and no cell lies "
+                               "between"),
+                  EntityKind::kFace, {of_gone.slot(), of_kept.slot()});
+  }
+
+  absl::Status CheckDangling(FaceId of_kept, FaceId of_gone) const {
+    if (!mesh_.IsElement(of_kept) || !mesh_.IsElement(of_gone)) return absl::OkStatus();
+    return Refuse(reason::kElementInTheWay, "two faces that are elements would merge", EntityKind::kFace,
+                  {of_kept.slot(), of_gone.slot()});
+  }
+
+  const Mesh& mesh_;
+  const VertexId kept_, gone_;
+};
+
+/// Replaces the elements of the vertex that goes.
+class Collapser {
+ public:
+  Collapser(const Mesh& mesh, VertexId kept, VertexId gone, Patch& patch)
+      : mesh_(mesh), kept_(kept), gone_(gone), patch_(patch) {}
+
+  absl::Status Replace(EntityId element) {
+    patch_.Remove(element);
+    const auto vertices = mesh_.VerticesOf(element);
+    if (!Contains(vertices, kept_)) return Substitute(mesh_.Type(element), vertices);
+    switch (element.kind) {
+      case EntityKind::kCell:
+        return CollapseCell(element, vertices);
+      case EntityKind::kFace:
+        return CollapseFace(element, vertices);
+      default:
+        return absl::OkStatus();
+    }
+  }
+
+ private:
+  absl::Status Substitute(ElementType type, absl::Span<const VertexId> vertices) {
+    std::array<VertexId, kMaxElementVertices> moved;
+    std::replace_copy(vertices.begin(), vertices.end(), moved.begin(), gone_, kept_);
+    patch_.Add(type, absl::MakeConstSpan(moved.data(), vertices.size()));
+    return absl::OkStatus();
+  }
+
+  absl::Status RefuseCorners(EntityId element) const {
+    return Refuse(reason::kNotSimplex,
+                  absl::StrCat("the ends of the edge are opposite corners of ", EntityKindName(element.kind),
+                               " ", element.slot),
+                  element.kind, {element.slot});
+  }
+
+  /// The cycle with the two ends as one; they follow each other, or the size is 0 in a triangle's place.
+  Polygon Shrunk(absl::Span<const VertexId> cycle) const {
+    Polygon shrunk;
+    const bool both = Contains(cycle, kept_) && Contains(cycle, gone_);
+    for (VertexId v : cycle) {
+      if (v == gone_ && both) continue;
+      shrunk.vertices[shrunk.size++] = v == gone_ ? kept_ : v;
+    }
+    return shrunk;
+  }
+
+  static bool AreOpposite(absl::Span<const VertexId> cycle, VertexId a, VertexId b) {
+    return cycle.size() == 4 && ((cycle[0] == a && cycle[2] == b) || (cycle[0] == b && cycle[2] == a) ||
+                                 (cycle[1] == a && cycle[3] == b) || (cycle[1] == b && cycle[3] == a));
+  }
+
+  absl::Status CollapseFace(EntityId element, absl::Span<const VertexId> vertices) {
+    if (AreOpposite(vertices, kept_, gone_)) return RefuseCorners(element);
+    const Polygon shrunk = Shrunk(vertices);
+    if (shrunk.size == 3) patch_.Add(ElementType::kTriangle, shrunk.span());
+    return absl::OkStatus();
+  }
+
+  absl::Status CollapseCell(EntityId element, absl::Span<const VertexId> vertices) {
+    const ElementTemplate& shape = TemplateOf(mesh_.Type(element));
+    std::array<Polygon, kMaxElementFaces> faces;
+    size_t num_faces = 0, merged = 0;
+    bool cone = true;
+    for (int i = 0; i < shape.num_faces; ++i) {
+      std::array<VertexId, kMaxFaceVertices> cycle;
+      const LocalFace& face = shape.faces[i];
+      for (int k = 0; k < face.size; ++k) cycle[k] = vertices[face.vertices[k]];
+      const auto span = absl::MakeConstSpan(cycle.data(), face.size);
+      if (AreOpposite(span, kept_, gone_)) return RefuseCorners(element);
+      const Polygon shrunk = Shrunk(span);
+      merged += shrunk.size < span.size();
+      if (shrunk.size < 3) continue;
+      cone &= shrunk.size == 3 || !Contains(shrunk.span(), kept_);
+      faces[num_faces++] = shrunk;
+    }
+    if (merged != 2) return RefuseCorners(element);
+    const auto left = absl::MakeConstSpan(faces.data(), num_faces);
+    cone ? Cones(left, kept_) : Cones(left, AddMiddle(vertices));
+    return absl::OkStatus();
+  }
+
+  void Cones(absl::Span<const Polygon> faces, VertexId apex) {
+    for (const Polygon& face : faces) {
+      if (!Contains(face.span(), apex)) AddCone(face.span(), apex, patch_);
+    }
+  }
+
+  /// A vertex in the middle of what is left of a cell.
+  VertexId AddMiddle(absl::Span<const VertexId> vertices) {
+    Patch::NewVertex middle{{0, 0, 0}, {}};
+    const double weight = 1.0 / (vertices.size() - 1);
+    for (VertexId v : vertices) {
+      if (v == gone_) continue;
+      middle.position = middle.position + weight * PositionAfter(mesh_, patch_, v);
+      middle.blend.vertices.push_back(v);
+      middle.blend.weights.push_back(weight);
+    }
+    return patch_.AddVertex(middle.position, std::move(middle.blend));
+  }
+
+  const Mesh& mesh_;
+  const VertexId kept_, gone_;
+  Patch& patch_;
+};
+
+}  // namespace
+
+absl::Status PlanCollapseEdge(const Mesh& mesh, EdgeId e, const CollapsePlace& place, Patch& patch) {
+  const auto ends = EndsFrom(mesh, e, place.origin);
+  const bool first_stays = place.parameter <= 0.5;
+  const VertexId kept = ends[first_stays ? 0 : 1], gone = ends[first_stays ? 1 : 0];
+  const Star star = StarOf(mesh, gone);
+  patch.work += star.work;
+  DYNMESH_RETURN_IF_ERROR(CheckNotDegenerate(mesh, star));
+  DYNMESH_RETURN_IF_ERROR(LinkCondition(mesh, kept, gone).Check(e));
+  const double t = place.parameter;
+  const Point on_edge = (1 - t) * mesh.Position(ends[0]) + t * mesh.Position(ends[1]);
+  const bool stays = !place.position && (t == 0 || t == 1);
+  if (!stays) {
+    for (EdgeId other : mesh.IncidentEdges(kept)) patch.work += 1 + 3 * mesh.IncidentFaces(other).size();
+    patch.moves.push_back({kept, place.position.value_or(on_edge), {{ends[0], ends[1]}, {1 - t, t}}});
+  }
+  Collapser collapser(mesh, kept, gone, patch);
+  absl::Status status;
+  ForEachElement(star, [&](EntityId element) {
+    if (status.ok()) status = collapser.Replace(element);
+  });
+  patch.removed_vertices.push_back(gone);
+  return status;
+}
+
+}  // namespace dynmesh

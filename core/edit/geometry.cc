@@ -1,0 +1,191 @@
+#include "core/edit/geometry.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "core/mesh/vector.h"
+
+namespace dynmesh {
+namespace {
+
+/// A vertex and the other ends of three of its edges, which turn as the first corner of a tetrahedron does.
+struct Corner {
+  uint8_t at;
+  uint8_t ends[3];
+};
+
+constexpr Corner kTetrahedronCorners[] = {{0, {1, 2, 3}}, {1, {2, 0, 3}}, {2, {0, 1, 3}}, {3, {0, 2, 1}}};
+/// The apex has four edges, and no corner.
+constexpr Corner kPyramidCorners[] = {{0, {1, 3, 4}}, {1, {2, 0, 4}}, {2, {3, 1, 4}}, {3, {0, 2, 4}}};
+constexpr Corner kPrismCorners[] = {{0, {2, 1, 3}}, {1, {0, 2, 4}}, {2, {1, 0, 5}},
+                                    {3, {4, 5, 0}}, {4, {5, 3, 1}}, {5, {3, 4, 2}}};
+constexpr Corner kHexahedronCorners[] = {{0, {1, 3, 4}}, {1, {2, 0, 5}}, {2, {3, 1, 6}}, {3, {0, 2, 7}},
+                                         {4, {7, 5, 0}}, {5, {4, 6, 1}}, {6, {5, 7, 2}}, {7, {6, 4, 3}}};
+
+absl::Span<const Corner> CornersOf(ElementType type) {
+  switch (type) {
+    case ElementType::kTetrahedron:
+      return kTetrahedronCorners;
+    case ElementType::kPyramid:
+      return kPyramidCorners;
+    case ElementType::kPrism:
+      return kPrismCorners;
+    case ElementType::kHexahedron:
+      return kHexahedronCorners;
+    default:
+      return {};
+  }
+}
+
+/// The scaled Jacobian at a corner of the regular shape.
+double RegularCorner(ElementType type) {
+  switch (type) {
+    case ElementType::kPyramid:
+      return std::sqrt(0.5);  // all edges of one length
+    case ElementType::kPrism:
+      return std::sqrt(0.75);
+    default:
+      return 1;
+  }
+}
+
+double Length(const Point& p) { return std::sqrt(Dot(p, p)); }
+
+double CornerVolume(const Corner& corner, absl::Span<const Point> p) {
+  const Point& o = p[corner.at];
+  return Dot(Cross(p[corner.ends[0]] - o, p[corner.ends[1]] - o), p[corner.ends[2]] - o);
+}
+
+double ScaledJacobian(const Corner& corner, absl::Span<const Point> p) {
+  double lengths = 1;
+  for (uint8_t end : corner.ends) lengths *= Length(p[end] - p[corner.at]);
+  return lengths > 0 ? CornerVolume(corner, p) / lengths : 0;
+}
+
+double ScaledJacobianOfQuad(absl::Span<const Point> p) {
+  const Point normal = AreaVector(ElementType::kQuad, p);
+  const double size = Length(normal);
+  double worst = 1;
+  for (int k = 0; k < 4; ++k) {
+    const Point next = p[(k + 1) % 4] - p[k], before = p[(k + 3) % 4] - p[k];
+    const double lengths = Length(next) * Length(before) * size;
+    worst = std::min(worst, lengths > 0 ? Dot(Cross(next, before), normal) / lengths : 0);
+  }
+  return std::max(worst, 0.0);
+}
+
+double SumOfSquaredEdges(ElementType type, absl::Span<const Point> p) {
+  const ElementTemplate& shape = TemplateOf(type);
+  double sum = 0;
+  for (int e = 0; e < shape.num_edges; ++e) {
+    const Point edge = p[shape.edges[e].vertices[1]] - p[shape.edges[e].vertices[0]];
+    sum += Dot(edge, edge);
+  }
+  return sum;
+}
+
+double SixVolumes(const Point& a, const Point& b, const Point& c, const Point& d) {
+  return Dot(Cross(b - a, c - a), d - a);
+}
+
+/// From the first vertex to all faces, which are oriented outwards.
+double SixVolumes(ElementType type, absl::Span<const Point> p) {
+  if (type == ElementType::kTetrahedron) return SixVolumes(p[0], p[1], p[2], p[3]);
+  const ElementTemplate& shape = TemplateOf(type);
+  double sum = 0;
+  for (int i = 0; i < shape.num_faces; ++i) {
+    const auto& v = shape.faces[i].vertices;
+    for (int k = 2; k < shape.faces[i].size; ++k) sum -= SixVolumes(p[v[0]], p[v[k - 1]], p[v[k]], p[0]);
+  }
+  return sum;
+}
+
+double MeanRatioOfTetrahedron(absl::Span<const Point> p) {
+  const double squares = SumOfSquaredEdges(ElementType::kTetrahedron, p);
+  if (!(squares > 0)) return 0;
+  const double root = std::cbrt(std::abs(SixVolumes(ElementType::kTetrahedron, p)) / 2);
+  return 12 * root * root / squares;
+}
+
+double MeanRatioOfTriangle(absl::Span<const Point> p) {
+  const double squares = SumOfSquaredEdges(ElementType::kTriangle, p);
+  return squares > 0 ? 2 * std::sqrt(3.0) * Length(AreaVector(ElementType::kTriangle, p)) / squares : 0;
+}
+
+double WorstCorner(ElementType type, absl::Span<const Point> p) {
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  for (const Corner& corner : CornersOf(type)) {
+    const double jacobian = ScaledJacobian(corner, p);
+    low = std::min(low, jacobian);
+    high = std::max(high, jacobian);
+  }
+  const double worst = low > 0 ? low : high < 0 ? -high : 0;
+  return std::min(1.0, worst / RegularCorner(type));
+}
+
+}  // namespace
+
+Point AreaVector(ElementType type, absl::Span<const Point> p) {
+  const Point first = Cross(p[1] - p[0], p[2] - p[0]);
+  return type == ElementType::kTriangle ? first : first + Cross(p[2] - p[0], p[3] - p[0]);
+}
+
+double Measure(ElementType type, absl::Span<const Point> p) {
+  switch (KindOf(type)) {
+    case EntityKind::kEdge:
+      return Length(p[1] - p[0]);
+    case EntityKind::kFace: {
+      const double first = Length(Cross(p[1] - p[0], p[2] - p[0])) / 2;
+      return type == ElementType::kTriangle ? first : first + Length(Cross(p[2] - p[0], p[3] - p[0])) / 2;
+    }
+    default:
+      return SixVolumes(type, p) / 6;
+  }
+}
+
+int Orientation(ElementType type, absl::Span<const Point> p) {
+  if (KindOf(type) != EntityKind::kCell) return 0;
+  bool positive = true, negative = true;
+  for (const Corner& corner : CornersOf(type)) {
+    const double volume = CornerVolume(corner, p);
+    positive &= volume > 0;
+    negative &= volume < 0;
+  }
+  return positive ? 1 : negative ? -1 : 0;
+}
+
+double Quality(ElementType type, absl::Span<const Point> p) {
+  switch (type) {
+    case ElementType::kTriangle:
+      return MeanRatioOfTriangle(p);
+    case ElementType::kQuad:
+      return ScaledJacobianOfQuad(p);
+    case ElementType::kTetrahedron:
+      return MeanRatioOfTetrahedron(p);
+    case ElementType::kWireEdge:
+      return 1;
+    default:
+      return WorstCorner(type, p);
+  }
+}
+
+double SmallestDihedralAngle(absl::Span<const Point> p) {
+  const ElementTemplate& shape = TemplateOf(ElementType::kTetrahedron);
+  std::array<Point, 4> normals;
+  for (int i = 0; i < 4; ++i) {
+    const auto& v = shape.faces[i].vertices;
+    normals[i] = Cross(p[v[1]] - p[v[0]], p[v[2]] - p[v[0]]);
+  }
+  double smallest = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < 4; ++i) {
+    for (int j = i + 1; j < 4; ++j) {
+      const double angle = std::atan2(Length(Cross(normals[i], normals[j])), -Dot(normals[i], normals[j]));
+      smallest = std::min(smallest, angle);
+    }
+  }
+  return smallest;
+}
+
+}  // namespace dynmesh

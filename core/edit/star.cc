@@ -1,0 +1,84 @@
+#include "core/edit/star.h"
+
+#include <algorithm>
+#include <string>
+
+#include "absl/strings/str_cat.h"
+
+namespace dynmesh {
+namespace {
+
+template <typename Id>
+void SortUnique(std::vector<Id>& ids) {
+  std::sort(ids.begin(), ids.end());
+  ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+}
+
+void Gather(const Mesh& mesh, EdgeId e, Star& star) {
+  ++star.work;
+  if (mesh.IsElement(e)) star.wires.push_back(e);
+  for (FaceId f : mesh.IncidentFaces(e)) {
+    if (mesh.IsElement(f)) star.faces.push_back(f);
+    const auto cells = mesh.IncidentCells(f);
+    star.cells.insert(star.cells.end(), cells.begin(), cells.end());
+    star.work += 1 + cells.size();
+  }
+}
+
+void MakeUnique(Star& star) {
+  SortUnique(star.cells);
+  SortUnique(star.faces);
+  SortUnique(star.wires);
+}
+
+}  // namespace
+
+Star StarOf(const Mesh& mesh, EdgeId e) {
+  Star star;
+  const auto ends = mesh.Vertices(e);
+  const auto fewer = std::min(mesh.IncidentEdges(ends[0]), mesh.IncidentEdges(ends[1]),
+                              [](const auto& a, const auto& b) { return a.size() < b.size(); });
+  star.work += fewer.size();
+  for (EdgeId other : fewer) {
+    const auto others = mesh.Vertices(other);
+    if (Contains(others, ends[0]) && Contains(others, ends[1])) Gather(mesh, other, star);
+  }
+  MakeUnique(star);
+  return star;
+}
+
+Star StarOf(const Mesh& mesh, VertexId v) {
+  Star star;
+  for (EdgeId e : mesh.IncidentEdges(v)) Gather(mesh, e, star);
+  MakeUnique(star);
+  return star;
+}
+
+absl::Status CheckNotDegenerate(const Mesh& mesh, const Star& star) {
+  absl::Status status;
+  ForEachElement(star, [&](EntityId id) {
+    if (!mesh.IsDegenerate(id) || !status.ok()) return;
+    status = Refuse(reason::kDegenerateElement,
+                    absl::StrCat(EntityKindName(id.kind), " ", id.slot, " names a vertex twice"), id.kind,
+                    {id.slot});
+  });
+  return status;
+}
+
+bool Contains(absl::Span<const VertexId> vertices, VertexId v) {
+  return std::find(vertices.begin(), vertices.end(), v) != vertices.end();
+}
+
+std::array<VertexId, 2> EndsFrom(const Mesh& mesh, EdgeId e, VertexId origin) {
+  const auto ends = mesh.Vertices(e);
+  return ends[1] == origin ? std::array<VertexId, 2>{ends[1], ends[0]}
+                           : std::array<VertexId, 2>{ends[0], ends[1]};
+}
+
+absl::Status Refuse(absl::string_view reason, absl::string_view message, EntityKind kind,
+                    absl::Span<const Slot> ids) {
+  return FailedPrecondition(reason, message,
+                            {{"kind", std::string(EntityKindName(kind))}, {"ids", JoinSlots(ids)}});
+}
+
+}  // namespace dynmesh

@@ -1,0 +1,91 @@
+"""Splits, collapses and swaps through the daemon; mirrors follow them."""
+
+import dynmesh
+import numpy as np
+import pytest
+from model import Model
+from shapes import TET
+
+
+def octahedron(session) -> None:
+    """Four tetrahedra round the edge 4-5."""
+    points = [[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0], [0, 0, -1], [0, 0, 1]]
+    session.import_mesh(points, {"tetra": [[4, 5, i, (i + 1) % 4] for i in range(4)]})
+
+
+def test_splits_collapses_and_swaps_are_followed_exactly(session):
+    octahedron(session)
+    with session.mirror() as mirror:
+        with session.edit(report_lineage=True) as tx:
+            middle = tx.split_edges(ends=[[4, 5]], parameters=0.25)
+        assert session.positions(tx.result.resolve(middle)).tolist() == [[0, 0, -0.5]]
+        assert session.counts.cells == 8
+        lineage = tx.result.lineage[0]
+        assert sorted(lineage.parents.tolist()) == [0, 0, 1, 1, 2, 2, 3, 3]
+        assert set(lineage.kinds.tolist()) == {3} and len(set(lineage.elements.tolist())) == 8
+        with session.edit() as tx:
+            tx.collapse_edges(ends=[[5, 6]], parameters=0)
+        assert session.counts.cells == 4
+        with session.edit() as tx:
+            tx.swap_edges(ends=[[4, 5]])
+        with session.edit() as tx:
+            tx.split_elements("cell", session.snapshot().blocks[0].ids[:1])
+        mirror.wait(session.revision, timeout=30)
+        assert mirror.checksum == session.info().checksum
+    assert Model.of(session.snapshot()).checksum() == session.info().checksum
+
+
+def test_a_vertex_of_a_split_serves_the_same_batch(session):
+    octahedron(session)
+    with session.edit() as tx:
+        middle = tx.split_edges(ends=[[4, 5]])
+        again = tx.split_edges(ends=[[4, middle[0]]])
+        tx.move_vertices(again, [[0, 0, -0.3]])
+    assert session.positions(tx.result.resolve(again)).tolist() == [[0, 0, -0.3]]
+
+
+def test_refusals_say_why_and_can_be_passed_over(session):
+    octahedron(session)
+    with pytest.raises(dynmesh.FailedPreconditionError) as refused:
+        with session.edit() as tx:
+            tx.swap_edges(ends=[[0, 1]])
+    assert refused.value.reason == "BOUNDARY" and refused.value.metadata["kind"] == "edge"
+    assert session.revision == 1
+    with session.edit(skip_refused=True) as tx:
+        tx.swap_edges(ends=[[0, 1], [4, 5]])
+        tx.split_edges(ends=[[0, 2], [4, 5]])
+    assert tx.result.skipped[0].tolist() == [0]
+    assert tx.result.refusals[0][0].reason == "BOUNDARY"
+    assert tx.result.skipped[1].size >= 1
+    assert tx.result.new_ids[1][tx.result.skipped[1]].tolist() == [0xFFFFFFFF] * tx.result.skipped[1].size
+
+
+def test_shapes_are_kept_unless_told_otherwise(session):
+    octahedron(session)
+    with pytest.raises(dynmesh.FailedPreconditionError, match="WOULD_INVERT"):
+        with session.edit() as tx:
+            tx.split_edges(ends=[[4, 5]], positions=[[9, 9, 9]])
+    with pytest.raises(dynmesh.FailedPreconditionError, match="WOULD_DEGRADE"):
+        with session.edit() as tx:
+            tx.split_edges(ends=[[4, 5]], min_quality=0.99)
+    with session.edit() as tx:
+        tx.split_edges(ends=[[4, 5]], positions=[[9, 9, 9]], allow_inversion=True)
+    assert session.counts.cells == 8
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [{}, {"edges": [0], "ends": [[0, 1]]}, {"edges": [0], "parameters": [0.1, 0.2]}, {"ends": [[0, 1, 2]]}],
+)
+def test_edges_are_named_in_one_way(session, arguments):
+    with pytest.raises(dynmesh.InvalidArgumentError):
+        with session.edit() as tx:
+            tx.split_edges(**arguments)
+
+
+def test_a_quad_and_a_wire_are_split_with_their_edges(session):
+    session.import_mesh(np.vstack([TET, [[1, 1, 0]]]), {"quad": [[0, 1, 4, 2]], "line": [[0, 1]]})
+    with session.edit() as tx:
+        tx.split_edges(ends=[[0, 1]])
+    assert session.counts.faces == 3
+    assert sum(block.type == dynmesh.ElementType.WIRE_EDGE and len(block.ids) for block in session.snapshot().blocks) == 2
