@@ -175,7 +175,7 @@ class BitSet {
 
   using EightSlots = Slot __attribute__((vector_size(8 * sizeof(Slot))));
 
-  void Grow(size_t word) {
+  [[gnu::noinline]] void Grow(size_t word) {
     words_.resize(word + 1);
     summary_.resize(word / 64 + 1);
   }

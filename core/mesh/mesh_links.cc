@@ -253,8 +253,7 @@ void Mesh::CountBoundary(EdgeId e, int change) {
   boundary_[1].Assign(e.slot(), after);
   for (VertexId v : edge_vertices_[e.slot()]) {
     uint32_t& uses = boundary_uses_[0][v.slot()];
-    uses += after ? 1 : -1;
-    boundary_[0].Assign(v.slot(), uses != 0);
+    if (after ? uses++ == 0 : --uses == 0) boundary_[0].Assign(v.slot(), after);
   }
 }
 

@@ -40,7 +40,9 @@ Slot Mesh::NewSlot(EntityKind kind, JournalEntry& entry) {
 }
 
 void Mesh::EnsureRow(EntityKind kind, Slot slot) {
-  const size_t rows = size_t{slot} + 1;
+  constexpr size_t kRowsAtOnce = 64;
+  if (slot < (kind == EntityKind::kVertex ? positions_.size() : flags_[Dimension(kind)].size())) return;
+  const size_t rows = slot / kRowsAtOnce * kRowsAtOnce + kRowsAtOnce;
   if (kind != EntityKind::kVertex) GrowTo(flags_[Dimension(kind)], rows);
   switch (kind) {
     case EntityKind::kVertex:

@@ -27,10 +27,9 @@ class StampColumn {
   Stamp At(Slot slot) const { return slot < stamps_.size() ? stamps_[slot] : 0; }
 
   void Touch(Slot slot, Stamp stamp) {
-    if (slot >= stamps_.size()) stamps_.resize(slot + 1);
-    stamps_[slot] = stamp;
     const Slot page = slot / kPageSlots;
-    if (page >= page_max_.size()) page_max_.resize(page + 1);
+    if (slot >= stamps_.size()) Grow(page + 1);
+    stamps_[slot] = stamp;
     page_max_[page] = std::max(page_max_[page], stamp);
   }
 
@@ -103,10 +102,17 @@ class StampColumn {
     return true;
   }
 
+  /// No slot from here on was ever touched.
   Slot size() const { return stamps_.size(); }
   size_t memory_bytes() const { return (stamps_.size() + page_max_.size()) * sizeof(Stamp); }
 
  private:
+  /// Whole pages at once.
+  [[gnu::noinline]] void Grow(size_t pages) {
+    stamps_.resize(pages * kPageSlots);
+    page_max_.resize(pages);
+  }
+
   std::vector<Stamp> stamps_;
   std::vector<Stamp> page_max_;
 };
