@@ -58,7 +58,7 @@ ABSL_FLAG(uint64_t, max_session_bytes, dynmesh::Limits().max_session_bytes,
           "Memory of a session's mesh; by default the smaller of 64 GiB and 3/4 of the machine's memory");
 ABSL_FLAG(uint64_t, max_batch_edits, dynmesh::Limits().max_batch_edits, "Edits in a batch");
 ABSL_FLAG(uint64_t, max_batch_items, dynmesh::Limits().max_batch_items,
-          "Vertices, elements and rows that the edits of a batch name");
+          "Vertices, elements and rows that the edits of a batch name, and elements that its operators make");
 ABSL_FLAG(uint64_t, max_message_bytes, dynmesh::Limits().max_message_bytes, "One request message");
 ABSL_FLAG(uint64_t, max_query_bytes, dynmesh::Limits().max_query_bytes, "One answer of a query or export");
 ABSL_FLAG(uint64_t, max_query_steps, dynmesh::Limits().max_query_steps,

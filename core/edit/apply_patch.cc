@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "absl/strings/str_cat.h"
+#include "core/edit/star.h"
 
 namespace dynmesh {
 namespace {
@@ -117,9 +118,14 @@ absl::Status Apply(Mesh& mesh, const Patch& patch, AppliedPatch& applied) {
   DYNMESH_RETURN_IF_ERROR(ReplaceElements(mesh, patch, applied));
   for (VertexId v : patch.removed_vertices) DYNMESH_RETURN_IF_ERROR(mesh.RemoveVertex(v));
   const int64_t after = EulerCharacteristic(mesh);
-  if (after == before) return absl::OkStatus();
-  return FailedPrecondition(reason::kWouldChangeTopology,
-                            absl::StrCat("the Euler characteristic would change by ", after - before));
+  if (after == before || !patch.check_euler) return absl::OkStatus();
+  const EntityKind kind = patch.removed.front().kind;
+  std::vector<Slot> ids;
+  for (EntityId id : patch.removed) {
+    if (id.kind == kind) ids.push_back(id.slot);
+  }
+  return Refuse(reason::kWouldChangeTopology,
+                absl::StrCat("the Euler characteristic would change by ", after - before), kind, ids);
 }
 
 }  // namespace

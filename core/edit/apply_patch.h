@@ -20,7 +20,7 @@ struct AppliedPatch {
 /// numbers weighed, others copied from the vertex that weighs most.
 ///
 /// Errors: those of Mesh's edits; FAILED_PRECONDITION WOULD_CHANGE_TOPOLOGY when the Euler characteristic
-/// (vertices - edges + faces - cells) would change. Nothing has changed then.
+/// (vertices - edges + faces - cells) would change and Patch::check_euler is set. Nothing has changed then.
 /// REQUIRES: a batch is open; the mesh is as it was when the patch was planned. Cost: linear in the patch.
 absl::Status ApplyPatch(Mesh& mesh, const Patch& patch, AppliedPatch& applied);
 

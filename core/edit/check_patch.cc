@@ -85,8 +85,10 @@ class PatchChecker {
         return before != 0 && Orientation(child.type, child.span()) != before;
       }
       case EntityKind::kFace: {
+        if (IsFlatFace(parent.type, parent.span())) return false;
         const Point before = AreaVector(parent.type, parent.span());
-        return Dot(before, before) > 0 && !(Dot(before, AreaVector(child.type, child.span())) > 0);
+        return IsFlatFace(child.type, child.span()) ||
+               !(Dot(before, AreaVector(child.type, child.span())) > 0);
       }
       default:
         return false;

@@ -15,9 +15,10 @@ struct PatchLimits {
   double min_quality = 0;
 };
 
-/// Whether the geometry permits a patch. Of elements that are flat, or folded, already nothing is asked.
-/// Errors: FAILED_PRECONDITION WOULD_INVERT, WOULD_DEGRADE, with the kind and id of the element whose place
-/// the offending one would take. Cost: linear in the patch and in the stars of the vertices that it moves.
+/// Whether the geometry permits a patch. Elements that are flat (kFlat), or folded, already have no
+/// orientation to keep. Errors: FAILED_PRECONDITION WOULD_INVERT, WOULD_DEGRADE, with the kind and id of the
+/// element whose place the offending one would take. Cost: linear in the patch and in the stars of the
+/// vertices that it moves.
 absl::Status CheckPatch(const Mesh& mesh, const Patch& patch, const PatchLimits& limits = {});
 
 }  // namespace dynmesh

@@ -225,6 +225,7 @@ absl::Status PlanCollapseEdge(const Mesh& mesh, EdgeId e, const CollapsePlace& p
     if (status.ok()) status = collapser.Replace(element);
   });
   patch.removed_vertices.push_back(gone);
+  patch.check_euler = true;
   return status;
 }
 

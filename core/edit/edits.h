@@ -76,15 +76,22 @@ struct SplitElementsEdit {
   PatchLimits limits;
 };
 
-using Edit = std::variant<AddVerticesEdit, RemoveVerticesEdit, MoveVerticesEdit, AddElementsEdit,
-                          RemoveElementsEdit, AddAttributeEdit, SetAttributeEdit, SplitEdgesEdit,
-                          CollapseEdgesEdit, SwapEdgesEdit, SwapFacesEdit, SplitElementsEdit>;
+struct MergeVerticesEdit {
+  std::vector<Slot> pairs;       ///< for each item the vertex that stays and the one that goes
+  std::vector<Point> positions;  ///< where they meet; or none: where the first one is
+  PatchLimits limits;
+};
 
-/// Whether it splits, collapses or swaps.
+using Edit =
+    std::variant<AddVerticesEdit, RemoveVerticesEdit, MoveVerticesEdit, AddElementsEdit, RemoveElementsEdit,
+                 AddAttributeEdit, SetAttributeEdit, SplitEdgesEdit, CollapseEdgesEdit, SwapEdgesEdit,
+                 SwapFacesEdit, SplitElementsEdit, MergeVerticesEdit>;
+
+/// Whether it splits, collapses, swaps or merges.
 inline bool IsOperator(const Edit& edit) {
   return std::holds_alternative<SplitEdgesEdit>(edit) || std::holds_alternative<CollapseEdgesEdit>(edit) ||
          std::holds_alternative<SwapEdgesEdit>(edit) || std::holds_alternative<SwapFacesEdit>(edit) ||
-         std::holds_alternative<SplitElementsEdit>(edit);
+         std::holds_alternative<SplitElementsEdit>(edit) || std::holds_alternative<MergeVerticesEdit>(edit);
 }
 
 /// How many vertices, elements, rows, or places for an operator an edit names.

@@ -149,11 +149,18 @@ int Orientation(ElementType type, absl::Span<const Point> p) {
   if (KindOf(type) != EntityKind::kCell) return 0;
   bool positive = true, negative = true;
   for (const Corner& corner : CornersOf(type)) {
-    const double volume = CornerVolume(corner, p);
-    positive &= volume > 0;
-    negative &= volume < 0;
+    const double jacobian = ScaledJacobian(corner, p);
+    positive &= jacobian > kFlat;
+    negative &= jacobian < -kFlat;
   }
   return positive ? 1 : negative ? -1 : 0;
+}
+
+bool IsFlatFace(ElementType type, absl::Span<const Point> p) {
+  double longest = 0;
+  const int n = NumVertices(type);
+  for (int k = 0; k < n; ++k) longest = std::max(longest, Length(p[(k + 1) % n] - p[k]));
+  return !(Length(AreaVector(type, p)) > kFlat * longest * longest);
 }
 
 double Quality(ElementType type, absl::Span<const Point> p) {

@@ -15,10 +15,17 @@ double Measure(ElementType type, absl::Span<const Point> points);
 /// Twice the area vector of a triangle or quad. REQUIRES: type is one of these.
 Point AreaVector(ElementType type, absl::Span<const Point> points);
 
+/// Shapes count as flat below this scaled Jacobian, or area vector over the square of the longest edge:
+/// rounding makes such of flat ones.
+inline constexpr double kFlat = 1e-9;
+
 /// Of a cell: 1 if all its corners have the orientation of the template, -1 if all have the other, 0 else:
 /// the cell is flat or folded somewhere. A corner is the tetrahedron of a vertex and the ends of its three
 /// edges.
 int Orientation(ElementType type, absl::Span<const Point> points);
+
+/// Whether a triangle or quad has no side that it faces. REQUIRES: type is one of these.
+bool IsFlatFace(ElementType type, absl::Span<const Point> points);
 
 /// How good the shape is, from 1 (regular) to 0 (flat, or folded); no unit, and the same for either
 /// orientation.

@@ -12,6 +12,7 @@ void Patch::Clear() {
   added.clear();
   parents.clear();
   removed_vertices.clear();
+  check_euler = false;
   work = 0;
 }
 

@@ -43,6 +43,9 @@ struct Patch {
   std::vector<NewElement> added;
   std::vector<uint32_t> parents;  ///< of each added element: an index in `removed`
   std::vector<VertexId> removed_vertices;
+  /// Whether the planner leaves it to ApplyPatch to see that the Euler characteristic stays. Splits and swaps
+  /// keep the topology as they are made; merges are meant to change it.
+  bool check_euler = false;
   uint64_t work = 0;  ///< entities looked at to plan it
 
   void Clear();

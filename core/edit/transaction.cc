@@ -8,7 +8,9 @@
 #include "absl/strings/str_cat.h"
 #include "core/edit/apply_patch.h"
 #include "core/edit/collapse.h"
+#include "core/edit/merge.h"
 #include "core/edit/split.h"
+#include "core/edit/star.h"
 #include "core/edit/swap.h"
 #include "core/mesh/spatial_order.h"
 
@@ -109,28 +111,25 @@ class BatchApplier {
   }
 
   absl::Status operator()(const SplitEdgesEdit& edit) {
-    DYNMESH_RETURN_IF_ERROR(CheckPlaces(edit.edges, edit.parameters, edit.positions));
+    DYNMESH_RETURN_IF_ERROR(CheckPlaces(edit, [](double t) { return t > 0 && t < 1; }));
     return Operate({edit.edges.size(), 1}, edit.limits, [&](size_t i) -> absl::Status {
       DYNMESH_ASSIGN_OR_RETURN(const EdgeId e, ResolveEdge(edit.edges, i));
       SplitPlace place;
-      DYNMESH_RETURN_IF_ERROR(ReadPlace(edit, i, place));
+      if (!edit.parameters.empty()) place.parameter = edit.parameters[i];
+      place.position = PositionAt(edit.positions, i);
       place.origin = OriginOf(edit.edges, i);
-      if (!(place.parameter > 0 && place.parameter < 1))
-        return BadParameter(place.parameter, "between 0 and 1");
       return PlanSplitEdge(mesh_, e, place, patch_);
     });
   }
 
   absl::Status operator()(const CollapseEdgesEdit& edit) {
-    DYNMESH_RETURN_IF_ERROR(CheckPlaces(edit.edges, edit.parameters, edit.positions));
+    DYNMESH_RETURN_IF_ERROR(CheckPlaces(edit, [](double t) { return t >= 0 && t <= 1; }));
     return Operate({edit.edges.size(), 0}, edit.limits, [&](size_t i) -> absl::Status {
       DYNMESH_ASSIGN_OR_RETURN(const EdgeId e, ResolveEdge(edit.edges, i));
       CollapsePlace place;
-      place.parameter = 0.5;
-      DYNMESH_RETURN_IF_ERROR(ReadPlace(edit, i, place));
       place.origin = OriginOf(edit.edges, i);
-      if (!(place.parameter >= 0 && place.parameter <= 1))
-        return BadParameter(place.parameter, "from 0 to 1");
+      place.parameter = edit.parameters.empty() ? DefaultParameter(e, place.origin) : edit.parameters[i];
+      place.position = PositionAt(edit.positions, i);
       return PlanCollapseEdge(mesh_, e, place, patch_);
     });
   }
@@ -151,17 +150,26 @@ class BatchApplier {
   }
 
   absl::Status operator()(const SplitElementsEdit& edit) {
-    if (!IsEntityKind(edit.kind) || edit.kind == EntityKind::kVertex) return BadKind(edit.kind);
-    if (!edit.positions.empty() && edit.positions.size() != edit.elements.size()) {
-      return BadLength("positions", edit.elements.size(), edit.positions.size());
+    if (!IsEntityKind(edit.kind)) return BadKind(edit.kind);
+    if (edit.kind == EntityKind::kVertex) {
+      return InvalidArgument(reason::kBadEntityKind, "vertices are no elements", {{"field", "kind"}});
     }
+    DYNMESH_RETURN_IF_ERROR(CheckPositions(edit.positions, edit.elements.size()));
     return Operate({edit.elements.size(), 1}, edit.limits, [&](size_t i) -> absl::Status {
       const EntityId id(edit.kind, edit.elements[i]);
       DYNMESH_RETURN_IF_ERROR(CheckElement(id));
-      absl::optional<Point> position;
-      if (!edit.positions.empty()) position = edit.positions[i];
-      DYNMESH_RETURN_IF_ERROR(CheckFinite(position));
-      return PlanSplitElement(mesh_, id, position, patch_);
+      return PlanSplitElement(mesh_, id, PositionAt(edit.positions, i), patch_);
+    });
+  }
+
+  absl::Status operator()(const MergeVerticesEdit& edit) {
+    const size_t count = edit.pairs.size() / 2;
+    if (edit.pairs.size() % 2 != 0) return BadLength("vertices of pairs", 2 * count + 2, edit.pairs.size());
+    DYNMESH_RETURN_IF_ERROR(CheckPositions(edit.positions, count));
+    return Operate({count, 0}, edit.limits, [&](size_t i) -> absl::Status {
+      DYNMESH_ASSIGN_OR_RETURN(const VertexId kept, ResolveLive(edit.pairs[2 * i]));
+      DYNMESH_ASSIGN_OR_RETURN(const VertexId gone, ResolveLive(edit.pairs[2 * i + 1]));
+      return PlanMergeVertices(mesh_, kept, gone, PositionAt(edit.positions, i), patch_);
     });
   }
 
@@ -185,7 +193,8 @@ class BatchApplier {
     for (size_t i = 0; i < items.count; ++i) {
       patch_.Clear();
       absl::Status status = plan(i);
-      DYNMESH_RETURN_IF_ERROR(Charge());
+      if (const absl::Status charged = Charge(); !charged.ok())
+        return WithMetadata(charged, "index", absl::StrCat(i));
       if (status.ok()) status = CheckPatch(mesh_, patch_, limits);
       if (status.ok()) status = ApplyPatch(mesh_, patch_, applied_);
       if (status.ok()) {
@@ -249,33 +258,51 @@ class BatchApplier {
                                       : BadLength("ends of edges", edges.ends.size() + 1, edges.ends.size());
   }
 
-  static absl::Status CheckPlaces(const EdgeNames& edges, absl::Span<const double> parameters,
-                                  absl::Span<const Point> positions) {
-    DYNMESH_RETURN_IF_ERROR(CheckNames(edges));
-    const size_t count = edges.size();
-    if (!parameters.empty() && parameters.size() != count)
-      return BadLength("parameters", count, parameters.size());
+  /// Of SplitEdges and CollapseEdges. All items are checked before the first one is carried out.
+  template <typename EdgesEdit>
+  static absl::Status CheckPlaces(const EdgesEdit& edit, absl::FunctionRef<bool(double)> is_parameter) {
+    DYNMESH_RETURN_IF_ERROR(CheckNames(edit.edges));
+    const size_t count = edit.edges.size();
+    if (!edit.parameters.empty() && edit.parameters.size() != count) {
+      return BadLength("parameters", count, edit.parameters.size());
+    }
+    for (size_t i = 0; i < edit.parameters.size(); ++i) {
+      if (is_parameter(edit.parameters[i])) continue;
+      return InvalidArgument(reason::kBadArgument,
+                             absl::StrCat("parameter ", edit.parameters[i], " is not on the edge"),
+                             {{"field", "parameters"}, {"index", absl::StrCat(i)}});
+    }
+    return CheckPositions(edit.positions, count);
+  }
+
+  static absl::Status CheckPositions(absl::Span<const Point> positions, size_t count) {
     if (!positions.empty() && positions.size() != count)
       return BadLength("positions", count, positions.size());
+    for (size_t i = 0; i < positions.size(); ++i) {
+      const auto& [x, y, z] = positions[i];
+      if (std::isfinite(x) && std::isfinite(y) && std::isfinite(z)) continue;
+      return InvalidArgument(reason::kNonFinite, "a coordinate is NaN or infinite",
+                             {{"field", "positions"}, {"index", absl::StrCat(i)}});
+    }
     return absl::OkStatus();
   }
 
-  static absl::Status BadParameter(double parameter, absl::string_view range) {
-    return InvalidArgument(reason::kBadArgument, absl::StrCat("a parameter is ", range, ", not ", parameter),
-                           {{"field", "parameters"}});
+  static absl::optional<Point> PositionAt(absl::Span<const Point> positions, size_t i) {
+    return positions.empty() ? absl::nullopt : absl::optional<Point>(positions[i]);
   }
 
-  static absl::Status CheckFinite(const absl::optional<Point>& position) {
-    const bool finite = !position || (std::isfinite((*position)[0]) && std::isfinite((*position)[1]) &&
-                                      std::isfinite((*position)[2]));
-    return finite ? absl::OkStatus() : InvalidArgument(reason::kNonFinite, "a coordinate is not finite");
+  /// By default the middle, but where just one end is on the boundary that end, so that the boundary stays.
+  double DefaultParameter(EdgeId e, VertexId origin) const {
+    const auto ends = EndsFrom(mesh_, e, origin);
+    const bool first = mesh_.IsOnBoundary(ends[0]), second = mesh_.IsOnBoundary(ends[1]);
+    return first == second ? 0.5 : first ? 0 : 1;
   }
 
-  template <typename EdgesEdit, typename Place>
-  static absl::Status ReadPlace(const EdgesEdit& edit, size_t i, Place& place) {
-    if (!edit.parameters.empty()) place.parameter = edit.parameters[i];
-    if (!edit.positions.empty()) place.position = edit.positions[i];
-    return CheckFinite(place.position);
+  /// Resolve for a vertex that must still be there: one that the batch made may be gone again.
+  absl::StatusOr<VertexId> ResolveLive(Slot slot) const {
+    DYNMESH_ASSIGN_OR_RETURN(const VertexId v, Resolve(slot));
+    DYNMESH_RETURN_IF_ERROR(mesh_.CheckLive(v));
+    return v;
   }
 
   /// The end that was named first. REQUIRES: ResolveEdge succeeded.

@@ -34,6 +34,13 @@ const EdgeSources kEdgeSources = MakeEdgeSources();
 
 bool IsFinite(const Point& p) { return std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]); }
 
+absl::Status BornLater(EntityId id, Stamp born) {
+  return MakeError(absl::StatusCode::kNotFound, reason::kEntityRemoved,
+                   absl::StrCat(EntityKindName(id.kind), " ", id.slot, " is one that revision ", born,
+                                " made, after its id was read"),
+                   {{"kind", std::string(EntityKindName(id.kind))}, {"ids", absl::StrCat(id.slot)}});
+}
+
 absl::Status NonFinitePosition() {
   return InvalidArgument(reason::kNonFinite, "a coordinate is NaN or infinite");
 }
@@ -47,6 +54,7 @@ Mesh::Mesh(const MeshOptions& options) : options_(options) {}
 absl::Status Mesh::CheckLive(EntityId id, int64_t as_of_revision) const {
   const Slots& slots = this->slots(id.kind);
   if (slots.IsLive(id.slot) && slots.Born(id.slot) <= as_of_revision) return absl::OkStatus();
+  if (slots.IsLive(id.slot)) return BornLater(id, slots.Born(id.slot));
   return EntityNotFound(slots.Born(id.slot) == 0 ? reason::kUnknownEntity : reason::kEntityRemoved, id);
 }
 

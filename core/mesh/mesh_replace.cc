@@ -6,7 +6,8 @@
 namespace dynmesh {
 namespace {
 
-constexpr size_t kTypicalFaces = 32;  ///< of the cells round an edge
+constexpr size_t kTypicalCells = 16;  ///< in place of those round an edge
+constexpr size_t kTypicalFaces = 32;
 
 }  // namespace
 
@@ -27,11 +28,13 @@ absl::Status Mesh::ReplaceElements(absl::Span<const EntityId> removed, absl::Spa
       id.kind == EntityKind::kFace ? faces.push_back(FaceId(id.slot)) : edges.push_back(EdgeId(id.slot));
     }
   }
+  absl::InlinedVector<CellId, kTypicalCells> cells;
   for (size_t i = 0; i < added.size(); ++i) {
     DYNMESH_ASSIGN_OR_RETURN(const EntityId id, AddChecked(added[i].type, added[i].vertices(), {}));
-    if (id.kind == EntityKind::kCell) SettleBoundary(CellId(id.slot));
+    if (id.kind == EntityKind::kCell) cells.push_back(CellId(id.slot));
     replaced(i, id);
   }
+  for (CellId c : cells) SettleBoundary(c);
   ReleaseFaces(faces);
   ReleaseEdges(edges);
   return absl::OkStatus();

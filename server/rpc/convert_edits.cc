@@ -113,6 +113,14 @@ absl::StatusOr<Edit> ToEdit(const v1::SplitElements& message) {
   return edit;
 }
 
+absl::StatusOr<Edit> ToEdit(const v1::MergeVertices& message) {
+  MergeVerticesEdit edit;
+  DYNMESH_ASSIGN_OR_RETURN(edit.pairs, ToArray<Slot>(message.pairs(), "pairs"));
+  DYNMESH_ASSIGN_OR_RETURN(edit.positions, ToArray<Point>(message.positions(), "positions"));
+  edit.limits = ToPatchLimits(message.limits());
+  return edit;
+}
+
 absl::StatusOr<Edit> ToEdit(const v1::Edit& message) {
   switch (message.kind_case()) {
     case v1::Edit::kAddVertices:
@@ -139,6 +147,8 @@ absl::StatusOr<Edit> ToEdit(const v1::Edit& message) {
       return ToEdit(message.swap_faces());
     case v1::Edit::kSplitElements:
       return ToEdit(message.split_elements());
+    case v1::Edit::kMergeVertices:
+      return ToEdit(message.merge_vertices());
     case v1::Edit::KIND_NOT_SET:
       break;
   }

@@ -48,6 +48,11 @@ struct EditVisitor {
     fingerprint.AddArray(edit.positions);
     Add(edit.limits);
   }
+  void operator()(const MergeVerticesEdit& edit) {
+    fingerprint.AddArray(edit.pairs);
+    fingerprint.AddArray(edit.positions);
+    Add(edit.limits);
+  }
 
   template <typename EdgesEdit>
   void AddPlaced(const EdgesEdit& edit) {

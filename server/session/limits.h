@@ -23,7 +23,7 @@ struct Limits {
   uint32_t max_cells = 200'000'000;
   /// Memory of one session's mesh; looked at before each batch and during an import.
   uint64_t max_session_bytes = DefaultMaxSessionBytes();
-  /// Edits in a batch, and vertices, elements and rows that these name.
+  /// Edits in a batch; vertices, elements and rows that these name, and as many elements that operators make.
   uint64_t max_batch_edits = 100'000;
   uint64_t max_batch_items = 1'000'000;
   /// One request message.

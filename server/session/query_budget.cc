@@ -15,6 +15,11 @@ absl::Status QueryBudget::LeaseMore() {
   return absl::OkStatus();
 }
 
+absl::Status QueryBudget::CheckBytes(uint64_t bytes) const {
+  const uint64_t all = bytes_ + bytes;
+  return all <= max_bytes_ ? absl::OkStatus() : LimitExceeded("max_query_bytes", max_bytes_, all);
+}
+
 absl::Status QueryBudget::CheckSteps() {
   if (steps_ > max_steps_) return LimitExceeded("max_query_steps", max_steps_, steps_);
   next_check_ = std::min(steps_ + kStepsPerCheck, max_steps_ + 1);

@@ -36,6 +36,10 @@ class QueryBudget final : public WorkMeter {
     return bytes_ <= leased_ ? absl::OkStatus() : LeaseMore();
   }
 
+  /// Whether an answer of so many bytes more can be: for what is known to be too large before it is worked
+  /// out. Charges nothing. Errors: RESOURCE_EXHAUSTED LIMIT_EXCEEDED (max_query_bytes).
+  absl::Status CheckBytes(uint64_t bytes) const;
+
   /// To be called before the steps are made, so `steps` should be no more than some kStepsPerCheck.
   /// Errors: RESOURCE_EXHAUSTED LIMIT_EXCEEDED (max_query_steps); those of the StopSignal.
   absl::Status ChargeSteps(uint64_t steps) override {

@@ -117,6 +117,8 @@ absl::StatusOr<ScoredAnswer> QueryNearestVertices(const Session& session, const 
     return BadField("count", "count is outside 1-10000");
   ScoredAnswer answer;
   const auto gather = [&](SpatialSearch& search, QueryBudget& budget, int64_t revision) -> absl::Status {
+    const uint64_t of_each = std::min(question.count, session.num_live(EntityKind::kVertex));
+    DYNMESH_RETURN_IF_ERROR(budget.CheckBytes(question.points.size() * of_each * sizeof(NearVertex)));
     ScoredBuilder builder;
     for (const Point& point : question.points) {
       DYNMESH_RETURN_IF_ERROR(ChargeItem(budget, sizeof(uint32_t)));

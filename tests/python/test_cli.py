@@ -58,6 +58,20 @@ def test_a_mesh_through_the_command_and_out_again(run, mesh_file, tmp_path):
     assert json.loads(run("ls", "--json").stdout) == []
 
 
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("create", "odd", "--slot-map", "map.npz"),
+        ("create", "odd", "FILE", "--slot-map", "map.npz"),
+        ("store", "odd", "none", "vertex-cell"),
+    ],
+)
+def test_options_that_make_no_sense_together_are_refused(run, mesh_file, arguments):
+    refused = run(*(mesh_file if argument == "FILE" else argument for argument in arguments))
+    assert refused.returncode == 2 and "usage:" in refused.stderr
+    assert json.loads(run("ls", "--json").stdout) == []
+
+
 def test_output_for_humans(run, mesh_file):
     assert "2" in run("create", "human", mesh_file).stdout
     assert "human" in run("ls").stdout

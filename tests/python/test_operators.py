@@ -75,9 +75,16 @@ def test_shapes_are_kept_unless_told_otherwise(session):
 
 @pytest.mark.parametrize(
     "arguments",
-    [{}, {"edges": [0], "ends": [[0, 1]]}, {"edges": [0], "parameters": [0.1, 0.2]}, {"ends": [[0, 1, 2]]}],
+    [
+        {},
+        {"edges": [0], "ends": [[0, 1]]},
+        {"edges": [0], "parameters": [0.1, 0.2]},
+        {"edges": [0], "parameters": "half"},
+        {"edges": [0], "min_quality": "high"},
+        {"ends": [[0, 1, 2]]},
+    ],
 )
-def test_edges_are_named_in_one_way(session, arguments):
+def test_arguments_are_checked_before_anything_is_sent(session, arguments):
     with pytest.raises(dynmesh.InvalidArgumentError):
         with session.edit() as tx:
             tx.split_edges(**arguments)
@@ -89,3 +96,22 @@ def test_a_quad_and_a_wire_are_split_with_their_edges(session):
         tx.split_edges(ends=[[0, 1]])
     assert session.counts.faces == 3
     assert sum(block.type == dynmesh.ElementType.WIRE_EDGE and len(block.ids) for block in session.snapshot().blocks) == 2
+
+
+def test_two_tetrahedra_are_welded_at_a_face(session):
+    points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, -1]])
+    session.import_mesh(points, {"tetra": [[0, 1, 2, 3], [4, 6, 5, 7]]})
+    with session.edit() as tx:
+        tx.merge_vertices([[0, 4], [1, 5], [2, 6]])
+    assert (session.counts.vertices, session.counts.faces) == (5, 7)
+    cells = session.snapshot().blocks[0].ids
+    assert session.neighbors("cell", "cell", cells[:1]).row(0).tolist() == cells[1:].tolist()
+    with pytest.raises(dynmesh.FailedPreconditionError, match="EDGE_EXISTS"):
+        with session.edit() as tx:
+            tx.merge_vertices([[0, 1]])
+
+
+def test_errors_name_the_item(session):
+    with pytest.raises(dynmesh.InvalidArgumentError) as refused:
+        dynmesh.EditBatch().split_edges(ends=[[0, 1], [0, -1]])
+    assert refused.value.metadata["index"] == "1"

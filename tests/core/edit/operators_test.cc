@@ -225,6 +225,23 @@ TEST(OperatorsTest, RefusalsSayWhy) {
   EXPECT_EQ(ReasonAt(danglers, operators[0].plan, 0, 1), "");
 }
 
+TEST(OperatorsTest, EveryRefusalNamesWhatStandsInTheWay) {
+  for (auto& [name, mesh] : AllMeshes()) {
+    for (const Operator& op : AllOperators()) {
+      for (Slot slot = 0; slot < mesh.slots(op.kind).limit(); ++slot) {
+        mesh.BeginBatch();
+        const absl::Status status = Carry(mesh, op.plan, {op.kind, slot});
+        mesh.Rollback();
+        if (status.ok()) continue;
+        const auto detail = GetErrorDetail(status);
+        ASSERT_TRUE(detail) << status;
+        EXPECT_NE(detail->Find("kind"), "") << status;
+        EXPECT_NE(detail->Find("ids"), "") << status;
+      }
+    }
+  }
+}
+
 TEST(OperatorsTest, WhereARingAndItsFaceAreThereNoEdgeCanBeSwapped) {
   Mesh mesh = TetWheel(3);
   Add(mesh, ElementType::kTriangle, {2, 3, 4});

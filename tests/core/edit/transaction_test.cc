@@ -403,6 +403,10 @@ TEST(TransactionOperatorsTest, WhatTheCallerWroteWrongIsNeverPassedOver) {
   EXPECT_EQ(reason_of(split), reason::kBadArrayLength);
   split.parameters = {1};
   EXPECT_EQ(reason_of(split), reason::kBadArgument);
+  split.edges.ids = {7777, 0};  // not there, which is no excuse for the second one's parameter
+  split.parameters = {0.5, 7};
+  EXPECT_EQ(reason_of(split), reason::kBadArgument);
+  split.edges.ids = {0};
   split.parameters = {std::nan("")};
   EXPECT_EQ(reason_of(split), reason::kBadArgument);
   split.parameters = {};
@@ -418,6 +422,101 @@ TEST(TransactionOperatorsTest, WhatTheCallerWroteWrongIsNeverPassedOver) {
   EXPECT_EQ(reason_of(split), reason::kBadArgument);
   EXPECT_EQ(reason_of(SplitElementsEdit{EntityKind::kVertex, {0}, {}, {}}), reason::kBadEntityKind);
   EXPECT_EQ(Describe(mesh), before);
+}
+
+TEST(TransactionOperatorsTest, WeldingTwoBlocksAlongTheirSidesMakesOneOfThem) {
+  Mesh mesh;
+  AddVerticesEdit vertices;
+  AddElementsEdit cells{ElementType::kTetrahedron, {}};
+  const Mesh block = TetGrid(2, 2, 2);
+  std::vector<Slot> pairs;
+  for (int copy = 0; copy < 2; ++copy) {
+    const Slot first = vertices.positions.size();
+    block.slots(EntityKind::kVertex).live().ForEach([&](Slot v) {
+      Point p = block.Position(VertexId(v));
+      if (copy == 1 && p[0] == 0) pairs.insert(pairs.end(), {kNewVertex | (v + 2), kNewVertex | (first + v)});
+      p[0] += 2 * copy;
+      vertices.positions.push_back(p);
+    });
+    block.slots(EntityKind::kCell).live().ForEach([&](Slot c) {
+      for (VertexId v : block.Vertices(CellId(c))) cells.vertices.push_back(kNewVertex | (first + v.slot()));
+    });
+  }
+  const auto result = ApplyBatch(mesh, {vertices, cells, MergeVerticesEdit{pairs, {}, {}}}, {});
+  ASSERT_TRUE(result.ok()) << result.status();
+  const Mesh whole = TetGrid(4, 2, 2);
+  for (EntityKind kind : kEntityKinds)
+    EXPECT_EQ(mesh.NumLive(kind), whole.NumLive(kind)) << EntityKindName(kind);
+  EXPECT_EQ(mesh.Boundary(EntityKind::kFace).size(), whole.Boundary(EntityKind::kFace).size());
+  ExpectEqualsOracle(mesh, ModelOf(mesh));
+}
+
+TEST(TransactionOperatorsTest, DuplicatesAreSplitTogether) {
+  Mesh mesh = OneTet();
+  mesh.BeginBatch();
+  Add(mesh, ElementType::kTetrahedron, {0, 1, 2, 3});
+  for (int twice = 0; twice < 2; ++twice) {
+    Add(mesh, ElementType::kWireEdge, {0, 1});
+    Add(mesh, ElementType::kTriangle, {0, 1, 2});
+  }
+  Commit(mesh);
+  SplitEdgesEdit split;
+  split.edges.ends = {0, 1};
+  const auto result = ApplyBatch(mesh, {split}, {});
+  ASSERT_TRUE(result.ok()) << result.status();
+  EXPECT_EQ(mesh.NumElements(EntityKind::kCell), 4u);
+  EXPECT_EQ(mesh.NumElements(EntityKind::kFace), 4u);
+  EXPECT_EQ(mesh.NumElements(EntityKind::kEdge), 4u);
+  ExpectEqualsOracle(mesh, ModelOf(mesh));
+}
+
+TEST(TransactionOperatorsTest, ByDefaultACollapseLeavesTheBoundaryWhereItIs) {
+  for (bool inwards : {false, true}) {
+    Mesh mesh = TetGrid(3, 3, 3);
+    const VertexId corner(0), inside(21);
+    ASSERT_TRUE(mesh.IsOnBoundary(corner) && !mesh.IsOnBoundary(inside));
+    CollapseEdgesEdit collapse;
+    collapse.edges.ends = inwards ? std::vector<Slot>{0, 21} : std::vector<Slot>{21, 0};
+    ASSERT_TRUE(ApplyBatch(mesh, {collapse}, {}).ok());
+    EXPECT_EQ(mesh.Position(corner), (Point{0, 0, 0}));
+    EXPECT_FALSE(mesh.IsLive(inside));
+  }
+}
+
+TEST(TransactionOperatorsTest, WhatIsFlatButForRoundingIsFlat) {
+  std::mt19937 rng(5);
+  std::uniform_real_distribution<double> coordinate(-1, 1);
+  for (int round = 0; round < 200; ++round) {
+    Mesh mesh = OneTet();
+    mesh.BeginBatch();
+    for (Slot v = 0; v < 4; ++v) {
+      ASSERT_TRUE(mesh.MoveVertex(VertexId(v), {coordinate(rng), coordinate(rng), coordinate(rng)}).ok());
+    }
+    Commit(mesh);
+    SplitEdgesEdit split;
+    split.edges.ends = {0, 1};
+    ASSERT_TRUE(ApplyBatch(mesh, {split}, {}).ok());
+    SwapFacesEdit swap;  // one of the three new cells would have the whole edge 0-1 and its middle
+    swap.faces = {mesh.FindFace({VertexId(4), VertexId(2), VertexId(3)}).slot()};
+    EXPECT_EQ(ErrorReason(ApplyBatch(mesh, {swap}, {}).status()), reason::kWouldInvert);
+  }
+}
+
+TEST(TransactionOperatorsTest, VerticesThatCannotBeWeldedAreRefused) {
+  Mesh mesh = TwoHexes();
+  const auto reason_of = [&](Slot kept, Slot gone) {
+    const std::string before = Describe(mesh);
+    MergeVerticesEdit merge{{kept, gone}, {}, {.keep_orientation = false}};
+    const auto result = ApplyBatch(mesh, {merge}, {});
+    EXPECT_TRUE(result.ok() || Describe(mesh) == before);
+    return ErrorReason(result.status());
+  };
+  EXPECT_EQ(reason_of(0, 0), reason::kBadArgument);
+  EXPECT_EQ(reason_of(0, 1), reason::kEdgeExists);
+  EXPECT_EQ(reason_of(0, 2), reason::kNotSimplex);
+  EXPECT_EQ(reason_of(0, 99), reason::kUnknownEntity);
+  mesh = Book(2);
+  EXPECT_EQ(reason_of(2, 3), reason::kDuplicateElement);
 }
 
 TEST(TransactionOperatorsTest, FewItemsCannotTakeWithoutEnd) {

@@ -30,7 +30,7 @@ def as_int64(value: int, what: str) -> int:
 
 def as_id_rows(values: ArrayLike, width: int, what: str) -> Ids:
     """`values` as uint32[n, width]; an empty list is no rows."""
-    rows = _as_uint32(values, what, ndim=None)
+    rows = _as_uint32(values, what, ndim=None, width=width)
     if rows.size == 0 and rows.ndim <= 2:
         return rows.reshape(0, width)
     if rows.ndim != 2 or rows.shape[1] != width:
@@ -75,6 +75,16 @@ def as_count(value: int, what: str) -> int:
     raise InvalidArgumentError(f"{what} is not positive: {value}", reason="BAD_ARGUMENT", metadata={"field": what})
 
 
+def as_numbers(values: ArrayLike, count: int, what: str) -> Points:
+    """`values` as float64[count]; one number stands for all. Raises `InvalidArgumentError` for anything else."""
+    numbers = _as_array(values, what)
+    if numbers.dtype.kind not in "iuf":
+        raise InvalidArgumentError(f"{what} must be real numbers, not {numbers.dtype}", reason="BAD_ARGUMENT")
+    if numbers.ndim > 0 and numbers.shape != (count,):
+        raise InvalidArgumentError(f"{what} must have shape ({count},), not {numbers.shape}", reason="BAD_ARRAY_LENGTH")
+    return np.broadcast_to(numbers, count).astype(np.float64)
+
+
 def as_integers(values: ArrayLike) -> NDArray[np.int64] | None:
     """`values` as int64 of any shape; None for what are no such integers."""
     array = _as_array(values, "ids")
@@ -111,7 +121,7 @@ def frozen(array: NDArray[Any]) -> NDArray[Any]:
     return view
 
 
-def _as_uint32(values: ArrayLike, what: str, ndim: int | None) -> Ids:
+def _as_uint32(values: ArrayLike, what: str, ndim: int | None, width: int = 1) -> Ids:
     array = _as_array(values, what)
     if array.size == 0:
         array = array.astype(np.uint32)
@@ -121,7 +131,7 @@ def _as_uint32(values: ArrayLike, what: str, ndim: int | None) -> Ids:
         raise InvalidArgumentError(
             f"{what} must have {ndim} dimension(s), not shape {array.shape}", reason="BAD_ARRAY_LENGTH"
         )
-    _check_range(array, what)
+    _check_range(array, what, width)
     return array.astype(np.uint32, copy=False)
 
 
@@ -134,12 +144,12 @@ def _as_array(values: ArrayLike, what: str) -> NDArray[Any]:
         ) from None
 
 
-def _check_range(array: NDArray[Any], what: str) -> None:
+def _check_range(array: NDArray[Any], what: str, width: int) -> None:
     if array.size == 0 or (array.min() >= 0 and array.max() <= 0xFFFFFFFF):
         return
     index = int(np.flatnonzero((array < 0) | (array > 0xFFFFFFFF))[0])
     raise InvalidArgumentError(
         f"{what}: {int(array.flat[index])} is not between 0 and 2^32 - 1",
         reason="BAD_ARGUMENT",
-        metadata={"index": str(index)},
+        metadata={"index": str(index // width)},
     )

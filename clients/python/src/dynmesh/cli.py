@@ -33,6 +33,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     args, rest = parser.parse_known_args(arguments)
     if rest and args.run is not _serve:
         parser.error(f"unrecognized arguments: {' '.join(rest)}")
+    _check_together(parser, args)
     args.rest = rest
     try:
         return int(args.run(args) or 0)
@@ -173,6 +174,15 @@ def _serve(args: argparse.Namespace) -> int:
     binary = find_daemon(args.binary)
     sys.stdout.flush()
     os.execv(binary, [binary, *args.rest])
+
+
+def _check_together(parser: argparse.ArgumentParser, args: argparse.Namespace) -> None:
+    """Refuses options that make no sense with others."""
+    if getattr(args, "slot_map", None) and (args.file is None or args.slot_order != "hilbert"):
+        parser.error("--slot-map tells the ids that FILE got with --slot-order hilbert: else item i gets id i")
+    relations = getattr(args, "relations", [])
+    if None in relations and len(relations) > 1:
+        parser.error("none stands alone: it switches all relations to on demand")
 
 
 def _create(args: argparse.Namespace) -> None:

@@ -11,7 +11,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .arrays import Ids, as_id_rows, as_integers, as_ids, as_points, concatenate, f64_bytes, from_bytes, u32_bytes
+from .arrays import (
+    Ids,
+    as_id_rows,
+    as_ids,
+    as_integers,
+    as_number,
+    as_numbers,
+    as_points,
+    concatenate,
+    f64_bytes,
+    from_bytes,
+    u32_bytes,
+)
 from .checksum import Checksum
 from .columns import as_values, make_spec, values_bytes
 from .errors import InvalidArgumentError
@@ -52,6 +64,9 @@ class Refusal:
 class Lineage:
     """Elements that an operator made, in order, and those whose places they took, which are of the same kinds.
 
+    An element may have been replaced again by a later item: walk in order, ``origin[element] = origin.get(parent,
+    parent)``, to find what each came from.
+
     Attributes
     ----------
     kinds : uint8[n]
@@ -76,7 +91,8 @@ class EditResult:
     new_ids : tuple of uint32[n]
         For each edit the ids of what it added, in order.
     new_vertices : uint32[n]
-        Ids of all vertices that the batch added, in order.
+        Ids of the vertices that `add_vertices`, `split_edges` and `split_elements` added, in order; 0xffffffff for
+        those of items that were passed over.
     skipped : tuple of uint32[n]
         For each edit the items that were passed over, with ``skip_refused``.
     refusals : tuple of tuple of Refusal
@@ -225,7 +241,7 @@ class EditBatch:
         parameters : float[n] or float, optional
             Where on the edge, between 0 (its first vertex) and 1. Default 0.5.
         positions : float[n, 3], optional
-            Where else the vertices go.
+            Where else the vertices go. Attributes are weighed by `parameters` in any case.
         allow_inversion : bool
             Let elements be flat, or turned over against those whose place they take.
         min_quality : float
@@ -258,8 +274,8 @@ class EditBatch:
     ) -> int:
         """Draws each edge together; returns the edit's index. The nearer end keeps its id, the other one goes.
 
-        Parameters are those of `split_edges`; ``parameters`` may also be 0 or 1, and by default is 0.5, where the
-        first vertex keeps its id.
+        Parameters are those of `split_edges`. ``parameters`` may also be 0 or 1; at 0.5 the first vertex keeps its
+        id. The default is 0.5, but where just one end is on the boundary that end, so that the boundary stays.
         """
         names, count = self._edges(edges, ends)
         message = edits_pb2.CollapseEdges(
@@ -321,6 +337,33 @@ class EditBatch:
             limits=_limits(allow_inversion, min_quality),
         )
         return self._append_vertices(len(slots), split_elements=message)
+
+    def merge_vertices(
+        self,
+        pairs: ArrayLike,
+        *,
+        positions: ArrayLike | None = None,
+        allow_inversion: bool = False,
+        min_quality: float = 0.0,
+    ) -> int:
+        """Welds pairs of vertices that no edge joins; returns the edit's index.
+
+        Edges and faces that have the same vertices then are one: two meshes that touch grow together.
+
+        Parameters
+        ----------
+        pairs : uint32[n, 2]
+            The vertex that stays, and the one that goes: ids or handles of this batch.
+        positions : float[n, 3], optional
+            Where they meet; by default where the first one is.
+        """
+        rows = as_id_rows(self._wire(pairs), 2, "pairs of vertices")
+        message = edits_pb2.MergeVertices(
+            pairs=u32_bytes(rows),
+            positions=_positions(positions, len(rows)),
+            limits=_limits(allow_inversion, min_quality),
+        )
+        return self._append(merge_vertices=message)
 
     def edits(self) -> list[edits_pb2.Edit]:
         """The edits so far, as messages."""
@@ -436,17 +479,12 @@ def _to_wire(vertices: ArrayLike, batch_number: int) -> Any:
 
 
 def _limits(allow_inversion: bool, min_quality: float) -> edits_pb2.OperatorLimits:
-    return edits_pb2.OperatorLimits(allow_inversion=allow_inversion, min_quality=min_quality)
+    quality = as_number(min_quality, "min_quality")
+    return edits_pb2.OperatorLimits(allow_inversion=bool(allow_inversion), min_quality=quality)
 
 
 def _parameters(parameters: ArrayLike | None, count: int) -> bytes:
-    if parameters is None:
-        return b""
-    numbers = np.asarray(parameters, dtype=np.float64)
-    if numbers.ndim == 0:
-        numbers = np.full(count, numbers)
-    _check_same_length("parameters", numbers.size, count)
-    return f64_bytes(numbers)
+    return b"" if parameters is None else f64_bytes(as_numbers(parameters, count, "parameters"))
 
 
 def _positions(positions: ArrayLike | None, count: int) -> bytes:

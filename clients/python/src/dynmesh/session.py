@@ -234,8 +234,15 @@ class Session(SessionReader):
         )
         return batch.read(self._caller.unary(self._edits.ApplyEdits, request, timeout, repeatable=True))
 
-    def edit_stream(self, *, as_of_revision: int = 0, window: int = 64) -> EditStream:
-        """Pipelined edits: up to `window` batches are on their way at once."""
+    def edit_stream(
+        self,
+        *,
+        as_of_revision: int = 0,
+        skip_refused: bool = False,
+        report_lineage: bool = False,
+        window: int = 64,
+    ) -> EditStream:
+        """Pipelined edits: up to `window` batches are on their way at once. Other parameters as in `edit`."""
         read_at = as_int64(as_of_revision, "as_of_revision")
 
         def make_request(batch: EditBatch) -> edits_pb2.ApplyEditsRequest:
@@ -244,6 +251,8 @@ class Session(SessionReader):
                 edits=batch.edits(),
                 as_of_revision=read_at,
                 request_id=_new_request_id(),
+                skip_refused=skip_refused,
+                report_lineage=report_lineage,
             )
 
         return EditStream(self._edits.StreamEdits, make_request, window, self._caller.check_size)

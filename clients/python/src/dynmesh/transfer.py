@@ -14,7 +14,7 @@ from .arrays import CHUNK_BYTES, Ids, concatenate, f64_bytes, from_bytes, u32_by
 from .columns import Column, values_bytes, values_from_proto
 from .errors import InternalError
 from .info import MeshWarning, SessionInfo, info_from_proto, warning_from_proto
-from .kinds import ElementType, EntityKind
+from .kinds import ElementType, EntityKind, as_kind
 from .meshes import MeshData
 from .progress import Progress
 from .snapshot import Attribute, Block, Snapshot
@@ -28,14 +28,23 @@ class ImportResult:
     Attributes
     ----------
     slots : dict of EntityKind to uint32[n]
-        With ``slot_order="hilbert"``: ``slots[kind][i]`` is the id that the i-th item of a kind got. Else empty:
-        item i got id i.
+        With ``slot_order="hilbert"``: ``slots["vertex"][i]`` is the id that the i-th vertex got, and so on for the
+        kinds of elements; `EntityKind` and its name both serve. Else empty: item i got id i.
     """
 
     revision: int
     info: SessionInfo
     warnings: tuple[MeshWarning, ...]
     slots: dict[EntityKind, Ids]
+
+
+class _ByKind(dict[EntityKind, Ids]):
+    """Takes names of kinds, too."""
+
+    def __missing__(self, kind: Any) -> Ids:
+        if isinstance(kind, str):
+            return self[as_kind(kind)]
+        raise KeyError(kind)
 
 
 def import_requests(
@@ -68,7 +77,7 @@ def read_import(replies: Iterable[sessions_pb2.ImportMeshResponse], progress: Pr
         elif part == "result":
             result = reply.result
             warnings = tuple(warning_from_proto(w) for w in result.warnings)
-            slots = {kind: concatenate(ids, np.uint32) for kind, ids in pieces.items()}
+            slots = _ByKind({kind: concatenate(ids, np.uint32) for kind, ids in pieces.items()})
             return ImportResult(result.revision, info_from_proto(result.session), warnings, slots)
     raise InternalError("the import ended without a result")
 
