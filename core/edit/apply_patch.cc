@@ -2,12 +2,16 @@
 
 #include <algorithm>
 #include <cstring>
+#include <new>
+#include <stdexcept>
 
 #include "absl/strings/str_cat.h"
 #include "core/edit/star.h"
 
 namespace dynmesh {
 namespace {
+
+constexpr uint64_t kBytesOfRow = 32;  ///< its stamp and journal entry
 
 int64_t EulerCharacteristic(const Mesh& mesh) {
   int64_t sum = 0;
@@ -16,23 +20,37 @@ int64_t EulerCharacteristic(const Mesh& mesh) {
   return sum;
 }
 
+/// Sets a row unless it is as wanted already; counts the bytes.
+absl::Status SetRow(Mesh& mesh, int column, Slot slot, absl::Span<const uint8_t> row, uint64_t& bytes) {
+  if (mesh.attributes()[column].Row(slot) == row) return absl::OkStatus();
+  bytes += kBytesOfRow + 2 * row.size();  // in the column and in the journal
+  return mesh.SetAttribute(column, slot, row);
+}
+
 /// Rows that outlive the entities which had them.
 class SavedRows {
  public:
   SavedRows(const Mesh& mesh, absl::Span<const EntityId> entities) {
-    for (size_t column = 0; column < mesh.attributes().size(); ++column) {
-      for (size_t i = 0; i < entities.size(); ++i) {
-        if (mesh.attributes()[column].spec().kind == entities[i].kind)
-          Save(mesh, column, i, entities[i].slot);
+    if (mesh.attributes().empty()) return;
+    for (EntityId id : entities) {
+      begins_.push_back(rows_.size());
+      for (size_t column = 0; column < mesh.attributes().size(); ++column) {
+        if (mesh.attributes()[column].spec().kind == id.kind) Save(mesh, column, id.slot);
       }
     }
+    begins_.push_back(rows_.size());
   }
 
-  /// Gives `to`, of any kind, the rows of the i-th entity, if that is of the same kind.
-  absl::Status CopyTo(Mesh& mesh, size_t i, EntityId to) const {
-    for (const Row& row : rows_) {
-      if (row.entity != i || mesh.attributes()[row.column].spec().kind != to.kind) continue;
-      DYNMESH_RETURN_IF_ERROR(mesh.SetAttribute(row.column, to.slot, row.bytes));
+  /// Gives `to` the rows of the i-th entity, which is of the same kind.
+  absl::Status CopyTo(Mesh& mesh, size_t i, EntityId to, uint64_t& bytes) const {
+    if (begins_.empty()) return absl::OkStatus();
+    size_t next = begins_[i];
+    for (int column = 0; column < static_cast<int>(mesh.attributes().size()); ++column) {
+      const AttributeSpec& spec = mesh.attributes()[column].spec();
+      if (spec.kind != to.kind) continue;
+      const bool saved = next < begins_[i + 1] && rows_[next].column == column;
+      const std::vector<uint8_t> row = saved ? rows_[next++].bytes : std::vector<uint8_t>(spec.row_bytes());
+      DYNMESH_RETURN_IF_ERROR(SetRow(mesh, column, to.slot, row, bytes));
     }
     return absl::OkStatus();
   }
@@ -40,17 +58,17 @@ class SavedRows {
  private:
   struct Row {
     int column;
-    size_t entity;
     std::vector<uint8_t> bytes;
   };
 
-  void Save(const Mesh& mesh, int column, size_t entity, Slot slot) {
+  void Save(const Mesh& mesh, int column, Slot slot) {
     const auto bytes = mesh.attributes()[column].Row(slot);
     const bool zero = std::all_of(bytes.begin(), bytes.end(), [](uint8_t byte) { return byte == 0; });
-    if (!zero) rows_.push_back({column, entity, {bytes.begin(), bytes.end()}});
+    if (!zero) rows_.push_back({column, {bytes.begin(), bytes.end()}});
   }
 
-  std::vector<Row> rows_;
+  std::vector<Row> rows_;       ///< that are not all zeros: of one entity after the other, by column
+  std::vector<size_t> begins_;  ///< of each entity, and the end
 };
 
 std::vector<uint8_t> BlendRows(const AttributeColumn& column, const Blend& blend) {
@@ -72,12 +90,12 @@ std::vector<uint8_t> BlendRows(const AttributeColumn& column, const Blend& blend
   return row;
 }
 
-absl::Status BlendAttributes(Mesh& mesh, const Blend& blend, VertexId to) {
+absl::Status BlendAttributes(Mesh& mesh, const Blend& blend, VertexId to, uint64_t& bytes) {
   if (blend.vertices.empty()) return absl::OkStatus();
   for (size_t column = 0; column < mesh.attributes().size(); ++column) {
     if (mesh.attributes()[column].spec().kind != EntityKind::kVertex) continue;
     DYNMESH_RETURN_IF_ERROR(
-        mesh.SetAttribute(column, to.slot(), BlendRows(mesh.attributes()[column], blend)));
+        SetRow(mesh, column, to.slot(), BlendRows(mesh.attributes()[column], blend), bytes));
   }
   return absl::OkStatus();
 }
@@ -85,12 +103,12 @@ absl::Status BlendAttributes(Mesh& mesh, const Blend& blend, VertexId to) {
 absl::Status PlaceVertices(Mesh& mesh, const Patch& patch, AppliedPatch& applied) {
   for (const Patch::NewVertex& vertex : patch.new_vertices) {
     DYNMESH_ASSIGN_OR_RETURN(const VertexId v, mesh.AddVertex(vertex.position));
-    DYNMESH_RETURN_IF_ERROR(BlendAttributes(mesh, vertex.blend, v));
+    DYNMESH_RETURN_IF_ERROR(BlendAttributes(mesh, vertex.blend, v, applied.attribute_bytes));
     applied.new_vertices.push_back(v);
   }
   for (const Patch::Move& move : patch.moves) {
     DYNMESH_RETURN_IF_ERROR(mesh.MoveVertex(move.vertex, move.position));
-    DYNMESH_RETURN_IF_ERROR(BlendAttributes(mesh, move.blend, move.vertex));
+    DYNMESH_RETURN_IF_ERROR(BlendAttributes(mesh, move.blend, move.vertex, applied.attribute_bytes));
   }
   return absl::OkStatus();
 }
@@ -107,7 +125,7 @@ absl::Status ReplaceElements(Mesh& mesh, const Patch& patch, AppliedPatch& appli
   DYNMESH_RETURN_IF_ERROR(
       mesh.ReplaceElements(patch.removed, added, [&](size_t i, EntityId id) { applied.added[i] = id; }));
   for (size_t i = 0; i < added.size(); ++i) {
-    DYNMESH_RETURN_IF_ERROR(rows.CopyTo(mesh, patch.parents[i], applied.added[i]));
+    DYNMESH_RETURN_IF_ERROR(rows.CopyTo(mesh, patch.parents[i], applied.added[i], applied.attribute_bytes));
   }
   return absl::OkStatus();
 }
@@ -128,14 +146,22 @@ absl::Status Apply(Mesh& mesh, const Patch& patch, AppliedPatch& applied) {
                 absl::StrCat("the Euler characteristic would change by ", after - before), kind, ids);
 }
 
+/// Memory that runs out here leaves a mesh that nobody can put back: no refusal, but the end of it.
+void PutBack(Mesh& mesh, Mesh::Savepoint savepoint) try {
+  mesh.RollbackTo(savepoint);
+} catch (const std::bad_alloc&) {
+  throw std::runtime_error("memory ran out while an edit was rolled back");
+}
+
 }  // namespace
 
 absl::Status ApplyPatch(Mesh& mesh, const Patch& patch, AppliedPatch& applied) {
   const Mesh::Savepoint savepoint = mesh.MakeSavepoint();
   applied.new_vertices.clear();
   applied.added.clear();
+  applied.attribute_bytes = 0;
   absl::Status status = Apply(mesh, patch, applied);
-  if (!status.ok()) mesh.RollbackTo(savepoint);
+  if (!status.ok()) PutBack(mesh, savepoint);
   return status;
 }
 

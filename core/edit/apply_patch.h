@@ -13,6 +13,7 @@ namespace dynmesh {
 struct AppliedPatch {
   std::vector<VertexId> new_vertices;
   std::vector<EntityId> added;
+  uint64_t attribute_bytes = 0;  ///< that attributes of new and moved entities took
 };
 
 /// Carries out a patch. Faces and edges that old and new elements share live on. New elements take the

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "core/edit/geometry.h"
@@ -34,11 +35,13 @@ class PatchChecker {
   }
 
   absl::Status CheckMoved() const {
+    std::vector<EntityId> removed;
+    if (!patch_.moves.empty()) removed = patch_.removed;
+    std::sort(removed.begin(), removed.end());
     for (const Patch::Move& move : patch_.moves) {
       absl::Status status;
       ForEachElement(StarOf(mesh_, move.vertex), [&](EntityId id) {
-        const auto& removed = patch_.removed;
-        if (!status.ok() || std::find(removed.begin(), removed.end(), id) != removed.end()) return;
+        if (!status.ok() || std::binary_search(removed.begin(), removed.end(), id)) return;
         status = Check(id, After(mesh_.Type(id), mesh_.VerticesOf(id)));
       });
       DYNMESH_RETURN_IF_ERROR(status);
@@ -78,10 +81,11 @@ class PatchChecker {
     return absl::OkStatus();
   }
 
-  static bool Turns(const Shape& parent, const Shape& child) {
+  bool Turns(const Shape& parent, const Shape& child) const {
     switch (KindOf(child.type)) {
       case EntityKind::kCell: {
-        const int before = Orientation(parent.type, parent.span());
+        const int before =
+            patch_.orientation != 0 ? patch_.orientation : Orientation(parent.type, parent.span());
         return before != 0 && Orientation(child.type, child.span()) != before;
       }
       case EntityKind::kFace: {

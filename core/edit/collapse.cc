@@ -22,7 +22,8 @@ struct Polygon {
 /// What the collapse of one edge ties together, and whether anything else would merge.
 class LinkCondition {
  public:
-  LinkCondition(const Mesh& mesh, VertexId kept, VertexId gone) : mesh_(mesh), kept_(kept), gone_(gone) {}
+  LinkCondition(const Mesh& mesh, VertexId kept, VertexId gone, uint64_t& work)
+      : mesh_(mesh), kept_(kept), gone_(gone), work_(work) {}
 
   absl::Status Check(EdgeId e) const {
     if (mesh_.IsOnBoundary(kept_) && mesh_.IsOnBoundary(gone_) && !mesh_.IsOnBoundary(e)) {
@@ -47,6 +48,7 @@ class LinkCondition {
   absl::Status CheckEdge(EdgeId of_gone) const {
     const VertexId c = OtherEnd(of_gone);
     if (c == kept_) return absl::OkStatus();
+    work_ += WorkOfLookUp();
     const EdgeId of_kept = mesh_.FindEdge(kept_, c);
     if (!of_kept.valid()) return absl::OkStatus();
     const FaceId between = mesh_.FindFace({kept_, gone_, c});
@@ -69,28 +71,118 @@ class LinkCondition {
   /// A face of `gone` may merge with one of `kept` only across a cell of both.
   absl::Status CheckFace(FaceId of_gone) const {
     const auto vertices = mesh_.Vertices(of_gone);
-    if (Contains(vertices, kept_)) return absl::OkStatus();
+    if (Contains(vertices, kept_)) return CheckShrinking(of_gone);
     std::array<VertexId, kMaxFaceVertices> moved;
     std::replace_copy(vertices.begin(), vertices.end(), moved.begin(), gone_, kept_);
-    const FaceId of_kept = mesh_.FindFace(absl::MakeConstSpan(moved.data(), vertices.size()));
+    const FaceId of_kept = Find(absl::MakeConstSpan(moved.data(), vertices.size()));
     if (!of_kept.valid()) return absl::OkStatus();
-    const auto cells = mesh_.IncidentCells(of_kept);
     for (CellId c : mesh_.IncidentCells(of_gone)) {
-      if (Contains(mesh_.Vertices(c), kept_) && std::find(cells.begin(), cells.end(), c) != cells.end()) {
-        return CheckDangling(of_kept, of_gone);
-      }
+      ++work_;
+      if (HasFace(c, of_kept)) return CheckDangling(of_kept, of_gone);
     }
-    return Refuse(reason::kLinkCondition,
-                  absl::StrCat("faces ", of_gone.slot(), " and ", of_kept.slot(),
-                               " would merge, and no cell lies "
-                               "between"),
-                  EntityKind::kFace, {of_gone.slot(), of_kept.slot()});
+    return RefuseMerger(of_gone, of_kept);
+  }
+
+  /// A quad of both becomes a triangle, which must not be there, with either end.
+  absl::Status CheckShrinking(FaceId quad) const {
+    const auto vertices = mesh_.Vertices(quad);
+    for (VertexId end : {gone_, kept_}) {
+      std::array<VertexId, kMaxFaceVertices> rest;
+      const auto size = std::remove_copy(vertices.begin(), vertices.end(), rest.begin(), end) - rest.begin();
+      if (size < 3) return absl::OkStatus();
+      const FaceId triangle = Find(absl::MakeConstSpan(rest.data(), size));
+      if (triangle.valid()) return RefuseMerger(quad, triangle);
+    }
+    return absl::OkStatus();
+  }
+
+  FaceId Find(absl::Span<const VertexId> cycle) const {
+    work_ += 3 * WorkOfLookUp();
+    return mesh_.FindFace(cycle);
+  }
+
+  absl::Status RefuseMerger(FaceId f, FaceId other) const {
+    return Refuse(
+        reason::kLinkCondition,
+        absl::StrCat("faces ", f.slot(), " and ", other.slot(), " would merge, and no cell lies between"),
+        EntityKind::kFace, {f.slot(), other.slot()});
+  }
+
+  bool HasFace(CellId c, FaceId f) const {
+    const auto faces = mesh_.Faces(c);
+    return std::any_of(faces.begin(), faces.end(),
+                       [f](OrientedFace oriented) { return oriented.face() == f; });
+  }
+
+  /// An edge or face is looked for in a list of at most so many.
+  uint64_t WorkOfLookUp() const {
+    return 1 + std::min<uint64_t>(mesh_.IncidentEdges(kept_).size(), Mesh::kSortedIncident);
   }
 
   absl::Status CheckDangling(FaceId of_kept, FaceId of_gone) const {
     if (!mesh_.IsElement(of_kept) || !mesh_.IsElement(of_gone)) return absl::OkStatus();
     return Refuse(reason::kElementInTheWay, "two faces that are elements would merge", EntityKind::kFace,
                   {of_kept.slot(), of_gone.slot()});
+  }
+
+  const Mesh& mesh_;
+  const VertexId kept_, gone_;
+  uint64_t& work_;
+};
+
+/// FAILED_PRECONDITION LINK_CONDITION if a cell of a patch would equal one that stays: both have a face
+/// without the kept vertex in common, which is there.
+class TwinCheck {
+ public:
+  TwinCheck(const Mesh& mesh, VertexId kept, VertexId gone) : mesh_(mesh), kept_(kept), gone_(gone) {}
+
+  absl::Status Check(const Patch& patch) const {
+    for (size_t i = 0; i < patch.added.size(); ++i) {
+      const EntityId parent = patch.removed[patch.parents[i]];
+      if (parent.kind != EntityKind::kCell) continue;
+      const CellId twin = TwinOf(patch.added[i], CellId(parent.slot));
+      if (!twin.valid()) continue;
+      return Refuse(reason::kLinkCondition,
+                    absl::StrCat("cell ", parent.slot, " would become equal to cell ", twin.slot()),
+                    EntityKind::kCell, {parent.slot, twin.slot()});
+    }
+    return absl::OkStatus();
+  }
+
+ private:
+  CellId TwinOf(const NewElement& element, CellId parent) const {
+    const ElementTemplate& shape = TemplateOf(element.type);
+    const auto vertices = element.vertices();
+    for (int i = 0; i < shape.num_faces; ++i) {
+      std::array<VertexId, kMaxFaceVertices> cycle;
+      for (int k = 0; k < shape.faces[i].size; ++k) cycle[k] = vertices[shape.faces[i].vertices[k]];
+      const auto span = absl::MakeConstSpan(cycle.data(), shape.faces[i].size);
+      const bool is_new =
+          std::any_of(span.begin(), span.end(), [](VertexId v) { return v.slot() & kNewVertex; });
+      if (is_new || Contains(span, kept_)) continue;
+      const FaceId f = mesh_.FindFace(span);
+      return f.valid() ? TwinAt(f, element, parent) : CellId();
+    }
+    return CellId();
+  }
+
+  /// Duplicates that were there before stay what they are.
+  bool AreEqual(CellId a, CellId b) const {
+    const auto first = mesh_.Vertices(a), second = mesh_.Vertices(b);
+    return std::is_permutation(first.begin(), first.end(), second.begin(), second.end());
+  }
+
+  CellId TwinAt(FaceId f, const NewElement& element, CellId parent) const {
+    const auto ours = element.vertices();
+    for (CellId c : mesh_.IncidentCells(f)) {
+      const auto theirs = mesh_.Vertices(c);
+      const bool shrinks = Contains(theirs, gone_) && Contains(theirs, kept_);
+      if (c == parent || mesh_.Type(c) != element.type || shrinks || AreEqual(c, parent)) continue;
+      std::array<VertexId, kMaxElementVertices> moved;
+      const auto end = std::replace_copy(theirs.begin(), theirs.end(), moved.begin(), gone_, kept_);
+      if (std::is_permutation(moved.begin(), end, ours.begin(), ours.end())) return c;
+    }
+    return CellId();
   }
 
   const Mesh& mesh_;
@@ -211,12 +303,12 @@ absl::Status PlanCollapseEdge(const Mesh& mesh, EdgeId e, const CollapsePlace& p
   const Star star = StarOf(mesh, gone);
   patch.work += star.work;
   DYNMESH_RETURN_IF_ERROR(CheckNotDegenerate(mesh, star));
-  DYNMESH_RETURN_IF_ERROR(LinkCondition(mesh, kept, gone).Check(e));
+  DYNMESH_RETURN_IF_ERROR(LinkCondition(mesh, kept, gone, patch.work).Check(e));
   const double t = place.parameter;
   const Point on_edge = (1 - t) * mesh.Position(ends[0]) + t * mesh.Position(ends[1]);
   const bool stays = !place.position && (t == 0 || t == 1);
   if (!stays) {
-    for (EdgeId other : mesh.IncidentEdges(kept)) patch.work += 1 + 3 * mesh.IncidentFaces(other).size();
+    patch.work += WorkOfStar(mesh, kept);
     patch.moves.push_back({kept, place.position.value_or(on_edge), {{ends[0], ends[1]}, {1 - t, t}}});
   }
   Collapser collapser(mesh, kept, gone, patch);
@@ -226,7 +318,7 @@ absl::Status PlanCollapseEdge(const Mesh& mesh, EdgeId e, const CollapsePlace& p
   });
   patch.removed_vertices.push_back(gone);
   patch.check_euler = true;
-  return status;
+  return status.ok() ? TwinCheck(mesh, kept, gone).Check(patch) : status;
 }
 
 }  // namespace dynmesh

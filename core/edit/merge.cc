@@ -82,7 +82,7 @@ absl::Status PlanMergeVertices(const Mesh& mesh, VertexId kept, VertexId gone,
   DYNMESH_RETURN_IF_ERROR(CheckNotDegenerate(mesh, star));
   DYNMESH_RETURN_IF_ERROR(CheckApart(mesh, kept, gone, star));
   if (position) {
-    for (EdgeId e : mesh.IncidentEdges(kept)) patch.work += 1 + 3 * mesh.IncidentFaces(e).size();
+    patch.work += WorkOfStar(mesh, kept);
     Patch::Move& move = patch.moves.emplace_back();
     move.vertex = kept;
     move.position = *position;

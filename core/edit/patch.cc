@@ -13,6 +13,7 @@ void Patch::Clear() {
   parents.clear();
   removed_vertices.clear();
   check_euler = false;
+  orientation = 0;
   work = 0;
 }
 

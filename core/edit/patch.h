@@ -46,6 +46,8 @@ struct Patch {
   /// Whether the planner leaves it to ApplyPatch to see that the Euler characteristic stays. Splits and swaps
   /// keep the topology as they are made; merges are meant to change it.
   bool check_euler = false;
+  /// What Orientation() of all added cells must be; 0: each that of its parent.
+  int orientation = 0;
   uint64_t work = 0;  ///< entities looked at to plan it
 
   void Clear();

@@ -87,6 +87,16 @@ void ConesOfCell(ElementType type, absl::Span<const VertexId> vertices, VertexId
   }
 }
 
+/// Whether cells use a face, or faces a wire, or what it is a duplicate of.
+bool IsUsed(const Mesh& mesh, EntityId element) {
+  const auto vertices = mesh.VerticesOf(element);
+  if (element.kind == EntityKind::kFace) return !mesh.IncidentCells(mesh.FindFace(vertices)).empty();
+  if (element.kind == EntityKind::kEdge) {
+    return !mesh.IncidentFaces(mesh.FindEdge(vertices[0], vertices[1])).empty();
+  }
+  return false;
+}
+
 }  // namespace
 
 absl::Status PlanSplitEdge(const Mesh& mesh, EdgeId e, const SplitPlace& place, Patch& patch) {
@@ -113,9 +123,7 @@ absl::Status PlanSplitElement(const Mesh& mesh, EntityId element, const absl::op
                   absl::StrCat(EntityKindName(element.kind), " ", element.slot, " names a vertex twice"),
                   element.kind, {element.slot});
   }
-  const bool used = element.kind == EntityKind::kFace   ? !mesh.IncidentCells(FaceId(element.slot)).empty()
-                    : element.kind == EntityKind::kEdge ? !mesh.IncidentFaces(EdgeId(element.slot)).empty()
-                                                        : false;
+  const bool used = IsUsed(mesh, element);
   if (used) {
     return Refuse(reason::kElementInTheWay,
                   absl::StrCat("other elements use ", EntityKindName(element.kind), " ", element.slot,

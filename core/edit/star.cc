@@ -54,6 +54,22 @@ Star StarOf(const Mesh& mesh, VertexId v) {
   return star;
 }
 
+bool HasElementAt(const Mesh& mesh, FaceId f) {
+  const auto others = mesh.IncidentFaces(mesh.Edges(f)[0]);
+  return mesh.IsElement(f) || std::any_of(others.begin(), others.end(), [&](FaceId other) {
+           return mesh.IsElement(other) && MatchFace(mesh.Vertices(f), mesh.Vertices(other));
+         });
+}
+
+uint64_t WorkOfStar(const Mesh& mesh, VertexId v) {
+  uint64_t work = 0;
+  for (EdgeId e : mesh.IncidentEdges(v)) {
+    ++work;
+    for (FaceId f : mesh.IncidentFaces(e)) work += 1 + mesh.IncidentCells(f).size();
+  }
+  return work;
+}
+
 absl::Status CheckNotDegenerate(const Mesh& mesh, const Star& star) {
   absl::Status status;
   ForEachElement(star, [&](EntityId id) {

@@ -33,6 +33,12 @@ void ForEachElement(const Star& star, Fn fn) {
 /// FAILED_PRECONDITION DEGENERATE_ELEMENT naming an element that names a vertex twice, if there is one.
 absl::Status CheckNotDegenerate(const Mesh& mesh, const Star& star);
 
+/// Whether a face, or another one of the same vertices, is an element.
+bool HasElementAt(const Mesh& mesh, FaceId f);
+
+/// What StarOf(mesh, v) would look at. Cost: the faces at the vertex.
+uint64_t WorkOfStar(const Mesh& mesh, VertexId v);
+
 bool Contains(absl::Span<const VertexId> vertices, VertexId v);
 
 /// The ends of an edge from `origin` on, or as they are stored where that is invalid.

@@ -196,10 +196,15 @@ class RingTriangulation {
   std::vector<Best> best_;
 };
 
-int OrientationOf(const Mesh& mesh, CellId c) {
-  std::array<Point, 4> points;
-  for (int i = 0; i < 4; ++i) points[i] = mesh.Position(mesh.Vertices(c)[i]);
-  return Orientation(ElementType::kTetrahedron, points);
+/// Of the first of some tetrahedra that is not flat; 0 when all are.
+int OrientationOf(const Mesh& mesh, absl::Span<const CellId> cells) {
+  int orientation = 0;
+  for (CellId c : cells) {
+    std::array<Point, 4> points;
+    for (int i = 0; i < 4; ++i) points[i] = mesh.Position(mesh.Vertices(c)[i]);
+    if (orientation == 0) orientation = Orientation(ElementType::kTetrahedron, points);
+  }
+  return orientation;
 }
 
 absl::Status PlanRemoveEdge(const Mesh& mesh, EdgeId e, absl::Span<const CellId> cells, Patch& patch) {
@@ -212,8 +217,10 @@ absl::Status PlanRemoveEdge(const Mesh& mesh, EdgeId e, absl::Span<const CellId>
   DYNMESH_ASSIGN_OR_RETURN(const Ring ring, RingRound(mesh, e, cells));
   const size_t n = ring.vertices.size();
   if (n < 3) return RefuseEdge(reason::kNonManifoldEdge, "has two cells that share two faces", e);
+  patch.orientation = OrientationOf(mesh, cells);
+  patch.work += n * n * n;
   RingTriangulation triangulation(mesh, mesh.Vertices(e)[0], mesh.Vertices(e)[1], ring.vertices,
-                                  OrientationOf(mesh, cells[0]));
+                                  patch.orientation);
   if (!triangulation.Find()) {
     return n == 3 ? RefuseEdge(reason::kFaceExists, "has a ring that is a face already", e)
                   : RefuseEdge(reason::kEdgeExists, "has a ring whose vertices are joined already", e);
@@ -239,7 +246,8 @@ absl::Status PlanSwapFace(const Mesh& mesh, FaceId f, Patch& patch) {
     return Refuse(reason, absl::StrCat("face ", f.slot(), " ", why), EntityKind::kFace, {f.slot()});
   };
   const auto cells = mesh.IncidentCells(f);
-  if (mesh.IsElement(f)) return refuse(reason::kElementInTheWay, "is an element itself");
+  if (HasElementAt(mesh, f))
+    return refuse(reason::kElementInTheWay, "is an element itself, or a duplicate of it is");
   if (cells.size() < 2) return refuse(reason::kBoundary, "has one cell");
   if (cells.size() > 2) return refuse(reason::kNonManifoldFace, "has more than two cells");
   DYNMESH_RETURN_IF_ERROR(CheckTetrahedra(mesh, cells));
@@ -263,6 +271,7 @@ absl::Status PlanSwapFace(const Mesh& mesh, FaceId f, Patch& patch) {
   if (outwards[0] == from_second[0])
     return refuse(reason::kInconsistentOrientation, "has cells that turn differently");
   const std::array<VertexId, 3> cycle = {p, outwards[0], outwards[1]};
+  patch.orientation = OrientationOf(mesh, cells);
   patch.Remove(first);
   patch.Remove(second);
   for (int k = 0; k < 3; ++k) {

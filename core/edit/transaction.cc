@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <new>
+#include <stdexcept>
 #include <string>
 
 #include "absl/strings/str_cat.h"
@@ -13,6 +14,7 @@
 #include "core/edit/star.h"
 #include "core/edit/swap.h"
 #include "core/mesh/spatial_order.h"
+#include "core/mesh/validate.h"
 
 namespace dynmesh {
 namespace {
@@ -198,6 +200,10 @@ class BatchApplier {
       if (status.ok()) status = CheckPatch(mesh_, patch_, limits);
       if (status.ok()) status = ApplyPatch(mesh_, patch_, applied_);
       if (status.ok()) {
+        attribute_bytes_ += applied_.attribute_bytes;
+        if (attribute_bytes_ > options_.max_attribute_bytes) {
+          return LimitExceeded("max_session_bytes", options_.max_attribute_bytes, attribute_bytes_);
+        }
         DYNMESH_RETURN_IF_ERROR(Report(items));
       } else if (options_.skip_refused && IsRefusal(status)) {
         Skip(items, i, std::move(status));
@@ -230,7 +236,7 @@ class BatchApplier {
     new_vertices_.insert(new_vertices_.end(), items.new_vertices, VertexId());
     result.new_slots.insert(result.new_slots.end(), items.new_vertices, kNoSlot);
     result.skipped.push_back(index);
-    if (result.refusals.size() < kMaxRefusals) result.refusals.push_back({index, std::move(status)});
+    if (num_refusals_++ < kMaxRefusals) result.refusals.push_back({index, std::move(status)});
   }
 
   absl::Status Report(const Items& items) {
@@ -427,6 +433,8 @@ class BatchApplier {
   std::vector<VertexId> new_vertices_;
   size_t num_lineage_ = 0;
   uint64_t work_ = 0;
+  size_t num_refusals_ = 0;
+  uint64_t attribute_bytes_ = 0;
   Patch patch_;
   AppliedPatch applied_;
 };
@@ -443,14 +451,23 @@ absl::Status ApplyAll(Mesh& mesh, absl::Span<const Edit> edits, const BatchOptio
   return absl::OkStatus();
 }
 
-/// Memory that runs out in the middle is a refusal like others: the batch is rolled back, which needs next to
-/// none.
+/// Memory that runs out in the middle is a refusal like others, if the mesh can be put back.
 absl::Status TryApplyAll(Mesh& mesh, absl::Span<const Edit> edits, const BatchOptions& options,
-                         BatchResult& result) try {
+                         BatchResult& result, bool& ran_out) try {
   return ApplyAll(mesh, edits, options, result);
 } catch (const std::bad_alloc&) {
+  ran_out = true;
   return MakeError(absl::StatusCode::kResourceExhausted, reason::kLimitExceeded, "memory ran out",
                    {{"limit", "memory"}});
+}
+
+/// Puts the mesh back. Where an allocation failed, an entity may have been left half made, which no journal
+/// knows: then all of the mesh is looked at, and one that is damaged is not kept in service.
+void PutBack(Mesh& mesh, bool ran_out) {
+  mesh.Rollback();
+  if (ran_out && !Validate(mesh, {.max_violations = 1}).empty()) {
+    throw std::runtime_error("memory ran out in the middle of an edit");
+  }
 }
 
 }  // namespace
@@ -459,9 +476,10 @@ absl::StatusOr<BatchResult> ApplyBatch(Mesh& mesh, absl::Span<const Edit> edits,
                                        const BatchOptions& options) {
   BatchResult result;
   mesh.BeginBatch();
-  absl::Status status = TryApplyAll(mesh, edits, options, result);
+  bool ran_out = false;
+  absl::Status status = TryApplyAll(mesh, edits, options, result, ran_out);
   if (!status.ok()) {
-    mesh.Rollback();
+    PutBack(mesh, ran_out);
     return status;
   }
   result.checksum = mesh.checksum();

@@ -26,7 +26,7 @@ struct Refusal {
   absl::Status status;
 };
 
-/// So many refusals of an edit are told in full.
+/// So many refusals of a batch are told in full.
 inline constexpr size_t kMaxRefusals = 100;
 
 /// What one edit did.
@@ -36,7 +36,7 @@ struct EditResult {
   std::vector<Slot> new_slots;
   std::vector<Lineage> lineage;   ///< of operators, with BatchOptions::max_lineage
   std::vector<uint32_t> skipped;  ///< items that were refused, with BatchOptions::skip_refused
-  std::vector<Refusal> refusals;  ///< of the first kMaxRefusals of them
+  std::vector<Refusal> refusals;  ///< of the first kMaxRefusals of the batch
 };
 
 /// What a batch did or, for a dry run, would have done.
@@ -64,6 +64,8 @@ struct BatchOptions {
   /// RESOURCE_EXHAUSTED: one item may touch as many elements as the mesh has.
   uint64_t max_made = std::numeric_limits<uint64_t>::max();
   uint64_t max_work = std::numeric_limits<uint64_t>::max();
+  /// The same for bytes of attributes that new vertices and elements take.
+  uint64_t max_attribute_bytes = std::numeric_limits<uint64_t>::max();
 };
 
 /// Applies `edits` in order to `mesh`, all or nothing, as one revision.

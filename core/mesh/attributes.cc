@@ -91,7 +91,9 @@ size_t AttributeColumn::BytesToSet(absl::Span<const Slot> slots) const {
   }
   std::sort(missing.begin(), missing.end());
   const size_t num_missing = std::unique(missing.begin(), missing.end()) - missing.begin();
-  const size_t new_stamps = end > stamps_.size() ? end - stamps_.size() : 0;
+  const size_t stamps =
+      (size_t{end} + StampColumn::kPageSlots - 1) / StampColumn::kPageSlots * StampColumn::kPageSlots;
+  const size_t new_stamps = stamps > stamps_.size() ? stamps - stamps_.size() : 0;
   return num_missing * StampColumn::kPageSlots * zeros_.size() + new_stamps * sizeof(Stamp);
 }
 

@@ -47,10 +47,19 @@ struct Journal {
     if (needed > entries.capacity()) entries.reserve(std::max(needed, 2 * entries.capacity()));
   }
 
+  /// Room for batches of usual sizes stays.
   void Clear() {
-    entries.clear();
-    positions.clear();
-    rows.clear();
+    constexpr size_t kKeptBytes = 4 << 20;
+    Clear(entries, kKeptBytes);
+    Clear(positions, kKeptBytes);
+    Clear(rows, kKeptBytes);
+  }
+
+ private:
+  template <typename T>
+  static void Clear(std::vector<T>& items, size_t kept_bytes) {
+    items.clear();
+    if (items.capacity() * sizeof(T) > kept_bytes) std::vector<T>().swap(items);
   }
 };
 

@@ -32,6 +32,7 @@ size_t Bytes(const std::vector<T>& rows) {
 }  // namespace
 
 Slot Mesh::NewSlot(EntityKind kind, JournalEntry& entry) {
+  if (journaling()) journal_.Expect(1);
   const auto [slot, born_before, at_end] = mutable_slots(kind).Allocate(next_stamp());
   entry = {JournalOp::kCreate, kind, slot, born_before, changed(kind).At(slot)};
   if (at_end) EnsureRow(kind, slot);
@@ -41,14 +42,14 @@ Slot Mesh::NewSlot(EntityKind kind, JournalEntry& entry) {
 
 void Mesh::EnsureRow(EntityKind kind, Slot slot) {
   constexpr size_t kRowsAtOnce = 64;
-  if (slot < (kind == EntityKind::kVertex ? positions_.size() : flags_[Dimension(kind)].size())) return;
+  const size_t dimension = Dimension(kind);
+  if (slot < (kind == EntityKind::kVertex ? positions_.size() : flags_[dimension].size())) return;
   const size_t rows = slot / kRowsAtOnce * kRowsAtOnce + kRowsAtOnce;
-  if (kind != EntityKind::kVertex) GrowTo(flags_[Dimension(kind)], rows);
   switch (kind) {
     case EntityKind::kVertex:
-      GrowTo(positions_, rows);
       GrowTo(boundary_uses_[0], rows);
-      break;
+      GrowTo(positions_, rows);
+      return;
     case EntityKind::kEdge:
       GrowTo(edge_vertices_, rows);
       GrowTo(boundary_uses_[1], rows);
@@ -63,6 +64,7 @@ void Mesh::EnsureRow(EntityKind kind, Slot slot) {
       GrowTo(cell_faces_, rows * cell_face_stride_);
       break;
   }
+  GrowTo(flags_[dimension], rows);  // last: it says that there is room, and any of them may run out of memory
 }
 
 void Mesh::WidenFaces(int stride) {

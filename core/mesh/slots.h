@@ -35,9 +35,9 @@ class Slots {
       free_.Clear(slot);
       first_free_hint_ = slot;
     }
-    live_.Set(slot);
     const Stamp born_before = born_.At(slot);
     born_.Touch(slot, born);
+    live_.Set(slot);
     return {slot, born_before, at_end};
   }
 

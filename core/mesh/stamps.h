@@ -67,7 +67,7 @@ class StampColumn {
 
   /// Whether all slots of [begin, end) have a stamp greater than `since`.
   bool AreAllSince(Stamp since, Slot begin, Slot end) const {
-    if (end > stamps_.size()) return false;
+    if (begin < end && (end > stamps_.size() || page_max_[begin / kPageSlots] <= since)) return false;
     Stamp oldest = kMaxStamp;
     for (Slot slot = begin; slot < end; ++slot) oldest = std::min(oldest, stamps_[slot]);
     return oldest > since;

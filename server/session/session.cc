@@ -190,6 +190,8 @@ absl::StatusOr<Session::AnswerPtr> Session::ApplyLocked(absl::Span<const Edit> e
   if (options.report_lineage) batch.max_lineage = kMaxLineage;
   batch.max_made = limits().max_batch_items;
   batch.max_work = kMaxBatchWork;
+  const uint64_t used = std::any_of(edits.begin(), edits.end(), IsOperator) ? mesh_.memory_bytes() : 0;
+  batch.max_attribute_bytes = limits().max_session_bytes - std::min(used, limits().max_session_bytes);
   bool returned = false;
   absl::StatusOr<BatchResult> result = CatchExceptions([&] {
     absl::StatusOr<BatchResult> applied = ApplyBatch(mesh_, edits, batch);

@@ -13,6 +13,7 @@ int main(int argc, char** argv) {
   RegisterRelations(fixture);
   RegisterBoundary(fixture);
   RegisterEdits(fixture);
+  RegisterOperators(fixture);
   RegisterDiff(fixture);
   RegisterLocality(fixture);
 #ifdef DYNMESH_BENCH_CGAL

@@ -128,8 +128,25 @@ def _builds(run):
 
 def _edits(run):
     rows = [[name, time_text(run.ns(name)), rate_text(run.rate(name))]
-            for name in run.benchmarks if name.startswith("edit/")]
+            for name in run.benchmarks if name.startswith(("edit/add_", "edit/remove_"))]
     return markdown(["a tenth of the elements, in one batch", "time", "elements"], rows)
+
+
+def operators(run):
+    """Names of the benchmarks of edit operators."""
+    return [name for name in run.benchmarks
+            if name.startswith("edit/") and name + "/by_elements" in run.benchmarks]
+
+
+def _operators(run):
+    rows = []
+    for name in operators(run):
+        peers = [f"{peer.split('/')[1]} {ratio_text(run.rate(name) / run.rate(peer))}"
+                 for peer in run.benchmarks if peer.startswith("peer/") and peer.split("/", 2)[2] == name]
+        by_elements = run.rate(name + "/by_elements")
+        rows.append([name, f"{run.rate(name) / 1e3:.0f} K/s", ratio_text(run.rate(name) / by_elements),
+                     ", ".join(peers) or "-"])
+    return markdown(["operator, at random places", "rate", "x rate by elements", "x rate of peers"], rows)
 
 
 def _against_limit(run, prefix):
@@ -171,7 +188,7 @@ def details(runs):
                   _relations(run), "",
                   markdown(["boundary and diff", "time", "x limit", "x warm limit"],
                            _against_limit(run, "boundary/") + _against_limit(run, "diff/")), "",
-                  _edits(run), "", _locality(run), ""]
+                  _edits(run), "", _operators(run), "", _locality(run), ""]
     scale = sorted((run for run in runs if run.family == "scale"), key=lambda run: run.elements)
     return "\n".join(parts + ["## Scale", "", _scale(scale)])
 

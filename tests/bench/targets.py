@@ -67,6 +67,19 @@ def _edits(table, run):
         table.at_least(f"{name}, {run.order} order", run.rate(f"edit/{name}"), rate)
 
 
+def _operators(table, run):
+    for name in report.operators(run):
+        what, rate = f"{name}, {run.type}, {run.order} order", run.rate(name)
+        table.at_least(f"{what}: rate / by removing and adding elements",
+                       rate / run.rate(name + "/by_elements"), 3.0, report.ratio_text)
+        for peer in run.benchmarks:
+            if peer.startswith("peer/") and peer.split("/", 2)[2] == name:
+                wanted = 0.4 if "cgal_tds3" in peer else 0.5
+                table.at_least(f"{what}: rate / {peer.split('/')[1]}", rate / run.rate(peer), wanted, report.ratio_text)
+        if name == "edit/collapse" and run.type == "tetrahedron":
+            table.at_least(what, rate, 60e3)
+
+
 def _locality(table, run):
     fresh = [name for name in run.benchmarks if name.startswith("locality/fresh/")]
     for name in fresh:
@@ -96,6 +109,9 @@ def table(runs):
     for part in (_build, _relations, _boundary_and_diff, _edits, _locality):
         for run in sorted(core, key=lambda run: run.order, reverse=True):
             part(result, run)
+    for run in runs:
+        if run.family == "core" and run.order == "hilbert":
+            _operators(result, run)
     for run in of_tets:
         if run.family == "memory":
             _memory(result, run)

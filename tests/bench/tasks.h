@@ -11,6 +11,7 @@ void RegisterBuild(const Fixture& fixture);
 void RegisterRelations(const Fixture& fixture);
 void RegisterBoundary(const Fixture& fixture);
 void RegisterEdits(const Fixture& fixture);
+void RegisterOperators(const Fixture& fixture);
 void RegisterDiff(const Fixture& fixture);
 void RegisterLocality(const Fixture& fixture);
 

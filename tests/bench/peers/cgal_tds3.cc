@@ -2,6 +2,7 @@
 
 #include "tests/bench/peers/cgal_tds3.h"
 
+#include "tests/bench/operators.h"
 #include "tests/bench/peers/peer.h"
 #include "tests/bench/tasks.h"
 
@@ -79,6 +80,61 @@ uint64_t SumBoundaryVertices(const CgalTds3& peer) {
   return SumInside(row);
 }
 
+/// Places of edits: a cell, and one or two of its vertices.
+struct EditedTds3 {
+  struct Place {
+    Tds::Cell_handle cell;
+    int i, j;
+  };
+  std::unique_ptr<CgalTds3> peer;
+  std::vector<Place> places;
+};
+
+/// The edges or faces of dynmesh's mesh, whose ids are those of the input.
+std::unique_ptr<EditedTds3> ReadyToEdit(const Fixture& fixture, EntityKind kind,
+                                        const std::vector<Slot>& places) {
+  const Mesh& mesh = fixture.mesh;
+  auto ready = std::make_unique<EditedTds3>();
+  ready->peer = BuildCgalTds3(fixture.input);
+  for (Slot place : places) {
+    const bool edge = kind == EntityKind::kEdge;
+    const FaceId f = edge ? mesh.IncidentFaces(EdgeId(place))[0] : FaceId(place);
+    const CellId c = mesh.IncidentCells(f)[0];
+    const auto cell = ready->peer->cells[c.slot()];
+    const auto index = [&](VertexId v) { return cell->index(ready->peer->vertices[v.slot()]); };
+    if (edge) {
+      ready->places.push_back(
+          {cell, index(mesh.Vertices(EdgeId(place))[0]), index(mesh.Vertices(EdgeId(place))[1])});
+    } else {
+      int across = 0 + 1 + 2 + 3;
+      for (VertexId v : mesh.Vertices(f)) across -= index(v);
+      ready->places.push_back({cell, across, 0});
+    }
+  }
+  return ready;
+}
+
+size_t SplitEdges(EditedTds3& edited) {
+  for (const auto& [cell, i, j] : edited.places) edited.peer->tds.insert_in_edge(cell, i, j);
+  return edited.places.size();
+}
+
+size_t SwapFaces(EditedTds3& edited) {
+  size_t done = 0;
+  for (const auto& [cell, i, j] : edited.places) done += edited.peer->tds.flip(cell, i);
+  return done;
+}
+
+void RegisterEdits(const Fixture& fixture, const std::string& operator_name, size_t (*edit)(EditedTds3&)) {
+  for (const Operator& op : OperatorsFor(fixture.input.type)) {
+    if (op.name != operator_name) continue;
+    const auto places = std::make_shared<const std::vector<Slot>>(PlacesFor(fixture.mesh, op, kPlaces));
+    RegisterPeerEdit(
+        "cgal_tds3/edit/" + op.name, places->size(),
+        [&fixture, kind = op.kind, places] { return ReadyToEdit(fixture, kind, *places); }, edit);
+  }
+}
+
 }  // namespace
 
 void RegisterCgalTds3(const Fixture& fixture) {
@@ -97,6 +153,8 @@ void RegisterCgalTds3(const Fixture& fixture) {
                    [peer] { return SumVertexCells(*peer); });
   RegisterPeerTask("cgal_tds3/relation/e_c", SumOf(flat, kEdgeCells), [peer] { return SumEdgeCells(*peer); });
   RegisterPeerTask("cgal_tds3/relation/c_c", SumOf(flat, kCellCells), [peer] { return SumCellCells(*peer); });
+  RegisterEdits(fixture, "split", SplitEdges);
+  RegisterEdits(fixture, "swap_face", SwapFaces);
   RegisterPeerTask("cgal_tds3/boundary/vertices", SumOf(fixture.mesh.Boundary(EntityKind::kVertex)),
                    [peer] { return SumBoundaryVertices(*peer); });
 }

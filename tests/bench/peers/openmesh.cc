@@ -3,6 +3,7 @@
 #include <OpenMesh/Core/Mesh/DefaultTriMesh.hh>
 #include <OpenMesh/Core/Mesh/TriMesh_ArrayKernelT.hh>
 
+#include "tests/bench/operators.h"
 #include "tests/bench/peers/peer.h"
 #include "tests/bench/tasks.h"
 
@@ -43,6 +44,72 @@ uint64_t SumBoundaryVertices(const Surface& surface) {
   return sum;
 }
 
+struct EditedSurface {
+  std::unique_ptr<Surface> surface;
+  std::vector<Surface::HalfedgeHandle> places;
+};
+
+std::unique_ptr<EditedSurface> ReadyToEdit(const Fixture& fixture, const std::vector<Slot>& places) {
+  auto ready = std::make_unique<EditedSurface>();
+  ready->surface = Build(fixture.input);
+  ready->surface->request_face_status();
+  ready->surface->request_edge_status();
+  ready->surface->request_vertex_status();
+  for (Slot place : places) {
+    const auto ends = fixture.mesh.Vertices(EdgeId(place));
+    // A collapse removes the vertex that its halfedge comes from.
+    ready->places.push_back(ready->surface->find_halfedge(Surface::VertexHandle(ends[1].slot()),
+                                                          Surface::VertexHandle(ends[0].slot())));
+  }
+  return ready;
+}
+
+size_t Split(EditedSurface& edited) {
+  Surface& surface = *edited.surface;
+  for (const auto halfedge : edited.places) {
+    const auto middle = (surface.point(surface.from_vertex_handle(halfedge)) +
+                         surface.point(surface.to_vertex_handle(halfedge))) /
+                        2;
+    surface.split(surface.edge_handle(halfedge), middle);
+  }
+  return edited.places.size();
+}
+
+size_t Flip(EditedSurface& edited) {
+  size_t done = 0;
+  for (const auto halfedge : edited.places) {
+    const auto edge = edited.surface->edge_handle(halfedge);
+    if (!edited.surface->is_flip_ok(edge)) continue;
+    edited.surface->flip(edge);
+    ++done;
+  }
+  return done;
+}
+
+size_t Collapse(EditedSurface& edited) {
+  size_t done = 0;
+  for (const auto halfedge : edited.places) {
+    if (!edited.surface->is_collapse_ok(halfedge)) continue;
+    edited.surface->collapse(halfedge);
+    ++done;
+  }
+  return done;
+}
+
+void RegisterEdits(const Fixture& fixture) {
+  const std::pair<const char*, size_t (*)(EditedSurface&)> edits[] = {
+      {"split", Split}, {"swap_edge", Flip}, {"collapse", Collapse}};
+  for (const Operator& op : OperatorsFor(fixture.input.type)) {
+    for (const auto& [name, edit] : edits) {
+      if (op.name != name) continue;
+      const auto places = std::make_shared<const std::vector<Slot>>(PlacesFor(fixture.mesh, op, kPlaces));
+      RegisterPeerEdit(
+          "openmesh/edit/" + op.name, places->size(),
+          [&fixture, places] { return ReadyToEdit(fixture, *places); }, edit);
+    }
+  }
+}
+
 }  // namespace
 
 void RegisterOpenMesh(const Fixture& fixture) {
@@ -54,6 +121,7 @@ void RegisterOpenMesh(const Fixture& fixture) {
                    [peer] { return SumVertexVertices(*peer); });
   RegisterPeerTask("openmesh/relation/v_f", SumOf(fixture.flat, kVertexFaces),
                    [peer] { return SumVertexFaces(*peer); });
+  RegisterEdits(fixture);
   RegisterPeerTask("openmesh/boundary/vertices", SumOf(fixture.mesh.Boundary(EntityKind::kVertex)),
                    [peer] { return SumBoundaryVertices(*peer); });
 }

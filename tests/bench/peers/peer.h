@@ -42,6 +42,29 @@ void RegisterPeerBuild(const std::string& name, size_t num_elements, Make make) 
   benchmark::RegisterBenchmark(("peer/" + name).c_str(), run)->Unit(benchmark::kMillisecond);
 }
 
+/// Edits of `items` places. `make` returns a pointer to what is edited, ready and with the places found, and
+/// `edit(*made)` how many edits it did; only that is timed.
+template <typename Make, typename Edit>
+void RegisterPeerEdit(const std::string& name, size_t items, Make make, Edit edit) {
+  constexpr int kIterations = 3;  // each makes a mesh
+  const auto run = [name, items, make, edit](benchmark::State& state) {
+    for (auto _ : state) {
+      state.PauseTiming();
+      auto made = make();
+      state.ResumeTiming();
+      const size_t done = edit(*made);
+      state.PauseTiming();
+      CheckSame(done == items, "peer", name.c_str());
+      made.reset();
+      state.ResumeTiming();
+    }
+    state.SetItemsProcessed(state.iterations() * items);
+  };
+  benchmark::RegisterBenchmark(("peer/" + name).c_str(), run)
+      ->Unit(benchmark::kMillisecond)
+      ->Iterations(kIterations);
+}
+
 /// Sum of all entries of a relation.
 inline uint64_t SumOf(const FlatMesh& flat, Relation relation) {
   const std::vector<uint32_t>& ids = flat.of(relation).ids;

@@ -242,6 +242,89 @@ TEST(OperatorsTest, EveryRefusalNamesWhatStandsInTheWay) {
   }
 }
 
+/// A mesh of these vertices and elements.
+Mesh MeshOf(const std::vector<Point>& points,
+            const std::vector<std::pair<ElementType, std::vector<Slot>>>& elements) {
+  Mesh mesh;
+  for (const Point& p : points) EXPECT_TRUE(mesh.AddVertex(p).ok());
+  for (const auto& [type, slots] : elements) {
+    std::vector<VertexId> vertices(slots.begin(), slots.end());
+    EXPECT_TRUE(mesh.AddElement(type, vertices).ok());
+  }
+  Commit(mesh);
+  return mesh;
+}
+
+TEST(OperatorsTest, SwapsAtAFlatCellTurnNothingOver) {
+  constexpr ElementType kTet = ElementType::kTetrahedron;
+  const std::vector<Point> points = {{0, 0, -1}, {0, 0, 1},   {1, 0, 0},
+                                     {-1, 0, 0}, {0, -20, 0}, {0.3, -0.3, 0}};
+  Mesh ring = MeshOf(
+      points, {{kTet, {0, 1, 2, 3}}, {kTet, {0, 1, 3, 4}}, {kTet, {0, 1, 4, 5}}, {kTet, {0, 1, 5, 2}}});
+  ring.BeginBatch();
+  ASSERT_TRUE(Carry(ring, AllOperators()[4].plan, ring.FindEdge(VertexId(0), VertexId(1))).ok());
+  EXPECT_EQ(NumInverted(ring), 0);
+  EXPECT_TRUE(ring.FindEdge(VertexId(3), VertexId(5)).valid());
+  const std::vector<Point> two = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {2, 2, 0}, {0.3, 0.3, -1}};
+  for (bool flat_first : {false, true}) {
+    Mesh pair = flat_first ? MeshOf(two, {{kTet, {0, 1, 2, 3}}, {kTet, {0, 2, 1, 4}}})
+                           : MeshOf(two, {{kTet, {0, 2, 1, 4}}, {kTet, {0, 1, 2, 3}}});
+    pair.BeginBatch();
+    const FaceId between = pair.FindFace({VertexId(0), VertexId(1), VertexId(2)});
+    EXPECT_EQ(ErrorReason(Carry(pair, AllOperators()[5].plan, between)), reason::kWouldInvert) << flat_first;
+  }
+}
+
+TEST(OperatorsTest, ACollapseThatWouldMakeTwoElementsEqualIsRefused) {
+  constexpr ElementType kTet = ElementType::kTetrahedron;
+  const std::vector<Point> points = {{0, 0, 1}, {0.2, 0.2, 0.3}, {1, 0, 0}, {0, 1, 0}, {-1, -1, 0}};
+  Mesh solid = MeshOf(points, {{kTet, {1, 0, 2, 3}},
+                               {kTet, {1, 0, 3, 4}},
+                               {kTet, {1, 0, 4, 2}},
+                               {kTet, {1, 2, 3, 4}},
+                               {kTet, {0, 2, 3, 4}}});
+  for (int op : {1, 2})
+    EXPECT_EQ(ReasonAt(solid, AllOperators()[op].plan, 0, 1), reason::kLinkCondition) << op;
+  Mesh surface = MeshOf({{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}}, {{ElementType::kQuad, {1, 0, 2, 3}},
+                                                                       {ElementType::kTriangle, {1, 0, 3}},
+                                                                       {ElementType::kTriangle, {0, 2, 3}}});
+  EXPECT_EQ(ReasonAt(surface, AllOperators()[1].plan, 0, 1), reason::kLinkCondition);
+}
+
+TEST(OperatorsTest, DuplicateCellsCollapseTogether) {
+  Mesh mesh = TetGrid(2, 2, 2);
+  mesh.BeginBatch();
+  const EntityId copy = *mesh.AddElement(ElementType::kTetrahedron, mesh.Vertices(CellId(0)));
+  ASSERT_TRUE(mesh.Commit().ok());
+  ASSERT_TRUE(mesh.FindTwin(CellId(copy.slot)).valid());
+  const EdgeId e = mesh.FindEdge(VertexId(13), VertexId(26));
+  ASSERT_EQ(mesh.Vertices(CellId(0))[3], VertexId(13));
+  Patch patch;
+  ASSERT_TRUE(PlanCollapseEdge(mesh, e, {.origin = VertexId(26)}, patch).ok());
+  AppliedPatch applied;
+  mesh.BeginBatch();
+  EXPECT_TRUE(ApplyPatch(mesh, patch, applied).ok());
+  EXPECT_FALSE(mesh.IsLive(VertexId(13)));
+  ExpectEqualsOracle(mesh, ModelOf(mesh));
+}
+
+TEST(OperatorsTest, DuplicatesOfAFaceStandInItsWayToo) {
+  Mesh mesh;
+  for (const Point& p : std::vector<Point>{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0.3, 0.3, 1}, {0.3, 0.3, -1}}) {
+    ASSERT_TRUE(mesh.AddVertex(p).ok());
+  }
+  Add(mesh, ElementType::kTetrahedron, {0, 1, 2, 3});
+  Add(mesh, ElementType::kTetrahedron, {0, 2, 1, 4});
+  const EntityId first = Add(mesh, ElementType::kTriangle, {0, 1, 2});
+  const EntityId second = Add(mesh, ElementType::kTriangle, {0, 1, 2});
+  ASSERT_TRUE(mesh.RemoveElement(first).ok());
+  Commit(mesh);
+  ASSERT_TRUE(mesh.IsDuplicate(second) && mesh.IsLive(first));
+  mesh.BeginBatch();
+  EXPECT_EQ(ErrorReason(Carry(mesh, AllOperators()[5].plan, first)), reason::kElementInTheWay);
+  EXPECT_EQ(ErrorReason(Carry(mesh, AllOperators()[7].plan, second)), reason::kElementInTheWay);
+}
+
 TEST(OperatorsTest, WhereARingAndItsFaceAreThereNoEdgeCanBeSwapped) {
   Mesh mesh = TetWheel(3);
   Add(mesh, ElementType::kTriangle, {2, 3, 4});

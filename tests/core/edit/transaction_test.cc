@@ -532,6 +532,55 @@ TEST(TransactionOperatorsTest, FewItemsCannotTakeWithoutEnd) {
   EXPECT_TRUE(ApplyBatch(mesh, {split}, {.max_lineage = 400, .max_made = 400, .max_work = 10000}).ok());
 }
 
+TEST(TransactionOperatorsTest, WorkAtAVertexThatOnlyMovesCountsToo) {
+  Mesh mesh = TetWheel(200);  // its cells stand at vertices 0 and 1
+  mesh.BeginBatch();
+  ASSERT_TRUE(mesh.AddVertex({5, 5, 5}).ok());
+  Add(mesh, ElementType::kWireEdge, {0, 202});
+  Commit(mesh);
+  CollapseEdgesEdit collapse;
+  collapse.edges.ends = {0, 202};
+  collapse.parameters = {0.25};
+  EXPECT_EQ(ErrorReason(ApplyBatch(mesh, {collapse}, {.max_work = 400}).status()), reason::kLimitExceeded);
+  Mesh ring = TetWheel(20);
+  SwapEdgesEdit swap{{{}, {0, 1}}, {.keep_orientation = false}};
+  EXPECT_EQ(ErrorReason(ApplyBatch(ring, {swap}, {.max_work = 5000}).status()), reason::kLimitExceeded);
+  EXPECT_TRUE(ApplyBatch(ring, {swap}, {.max_work = 10'000}).ok());
+}
+
+TEST(TransactionOperatorsTest, AttributesThatOperatorsSpreadAreLimitedAndZerosAreNotWritten) {
+  Mesh mesh = OneTet();
+  ASSERT_TRUE(
+      ApplyBatch(mesh, {AddAttributeEdit{{"t", EntityKind::kCell, AttributeType::kFloat64, 16}}}, {}).ok());
+  SplitElementsEdit split{EntityKind::kCell, {0}, {}, {}};
+  ASSERT_TRUE(ApplyBatch(mesh, {split}, {.max_attribute_bytes = 0}).ok());
+  const Slot cell = mesh.slots(EntityKind::kCell).live().Next(0);
+  std::vector<uint8_t> row(128, 1);
+  ASSERT_TRUE(ApplyBatch(mesh, {SetAttributeEdit{mesh.attributes()[0].spec(), {cell}, row}}, {}).ok());
+  split.elements = {cell};
+  const std::string before = Describe(mesh);
+  EXPECT_EQ(ErrorReason(ApplyBatch(mesh, {split}, {.max_attribute_bytes = 500}).status()),
+            reason::kLimitExceeded);
+  EXPECT_EQ(Describe(mesh), before);
+  EXPECT_TRUE(ApplyBatch(mesh, {split}, {.max_attribute_bytes = 2000}).ok());
+}
+
+TEST(TransactionOperatorsTest, RefusalsAreToldInFullForTheFirstHundredOfABatch) {
+  Mesh mesh = OneTet();
+  std::vector<Edit> edits(60, SwapEdgesEdit{{{77, 78, 79}, {}}, {}});
+  BatchOptions options;
+  options.skip_refused = true;
+  const auto result = ApplyBatch(mesh, edits, options);
+  ASSERT_TRUE(result.ok());
+  size_t told = 0, skipped = 0;
+  for (const EditResult& edit : result->results) {
+    told += edit.refusals.size();
+    skipped += edit.skipped.size();
+  }
+  EXPECT_EQ(told, kMaxRefusals);
+  EXPECT_EQ(skipped, 180u);
+}
+
 TEST(TransactionOperatorsTest, ElementsThatWouldTurnOverAreRefusedUnlessAllowed) {
   Mesh mesh = TetGrid(1, 1, 1);
   CollapseEdgesEdit collapse;

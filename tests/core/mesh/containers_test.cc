@@ -224,6 +224,19 @@ TEST(BitSetTest, ARangeIsWholeOnlyWithoutAGap) {
   }
 }
 
+TEST(StampColumnTest, SaysWhetherAllOfAPageChanged) {
+  StampColumn stamps;
+  for (Slot slot = 0; slot < 600; ++slot) stamps.Touch(slot, 3);
+  EXPECT_TRUE(stamps.AreAllSince(2, 0, 512));
+  EXPECT_FALSE(stamps.AreAllSince(3, 0, 512));
+  EXPECT_TRUE(stamps.AreAllSince(2, 512, 600));
+  EXPECT_FALSE(stamps.AreAllSince(0, 512, 601));
+  EXPECT_FALSE(stamps.AreAllSince(0, 1024, 1025));
+  stamps.Touch(100, 5);
+  EXPECT_FALSE(stamps.AreAllSince(3, 0, 512));
+  EXPECT_TRUE(stamps.AreAllSince(3, 100, 101));
+}
+
 TEST(EraseAscendingTest, RemovesOneEntryAndLeavesWhatStandsBehind) {
   std::mt19937 rng(11);
   for (size_t length = 1; length <= 40; ++length) {

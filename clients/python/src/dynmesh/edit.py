@@ -96,7 +96,7 @@ class EditResult:
     skipped : tuple of uint32[n]
         For each edit the items that were passed over, with ``skip_refused``.
     refusals : tuple of tuple of Refusal
-        For each edit why: of the first 100 of them.
+        For each edit why: of the first 100 of the batch.
     lineage : tuple of Lineage
         For each edit which elements it made of which, with ``report_lineage``.
     batch_number : int

@@ -1,0 +1,90 @@
+// Edit operators at random places, one after the other in one batch: planned, checked and carried out, with
+// edges, faces, boundary, stamps and checksums kept current. `.../by_elements` does the same by removing
+// elements and adding others.
+
+#include <benchmark/benchmark.h>
+
+#include <memory>
+
+#include "core/edit/apply_patch.h"
+#include "core/edit/check_patch.h"
+#include "tests/bench/digest.h"
+#include "tests/bench/operators.h"
+#include "tests/bench/tasks.h"
+
+namespace dynmesh::bench {
+namespace {
+
+using Places = std::shared_ptr<const std::vector<Slot>>;
+
+void OperateAt(Mesh& mesh, const Operator& op, const std::vector<Slot>& places) {
+  dynmesh::Patch patch;
+  AppliedPatch applied;
+  for (Slot place : places) {
+    patch.Clear();
+    Must(op.plan(mesh, place, patch));
+    Must(CheckPatch(mesh, patch));
+    Must(ApplyPatch(mesh, patch, applied));
+  }
+}
+
+/// As a client does who knows nothing but elements.
+void ReplaceByElements(Mesh& mesh, const std::vector<dynmesh::Patch>& patches) {
+  std::vector<VertexId> made;
+  for (const dynmesh::Patch& patch : patches) {
+    made.clear();
+    for (const auto& vertex : patch.new_vertices) made.push_back(Must(mesh.AddVertex(vertex.position)));
+    for (EntityId id : patch.removed) Must(mesh.RemoveElement(id));
+    for (NewElement element : patch.added) {
+      for (VertexId& v : element.mutable_vertices()) {
+        if (v.slot() & kNewVertex) v = made[v.slot() & ~kNewVertex];
+      }
+      Must(mesh.AddElement(element.type, element.vertices()));
+    }
+    for (VertexId v : patch.removed_vertices) Must(mesh.RemoveVertex(v));
+  }
+}
+
+template <typename Task>
+void Register(const std::string& name, const Mesh& mesh, size_t items, Task task) {
+  const auto run = [&mesh, items, task](benchmark::State& state) {
+    for (auto _ : state) {
+      state.PauseTiming();
+      auto copy = std::make_unique<Mesh>(mesh.Clone());
+      copy->BeginBatch();
+      state.ResumeTiming();
+      task(*copy);
+      state.PauseTiming();
+      copy.reset();
+      state.ResumeTiming();
+    }
+    state.SetItemsProcessed(state.iterations() * items);
+  };
+  benchmark::RegisterBenchmark(name.c_str(), run)->Unit(benchmark::kMillisecond);
+}
+
+void RegisterOperator(const Mesh& mesh, const Operator& op) {
+  const auto places = std::make_shared<const std::vector<Slot>>(PlacesFor(mesh, op, kPlaces));
+  const auto patches = std::make_shared<std::vector<dynmesh::Patch>>(places->size());
+  for (size_t i = 0; i < places->size(); ++i) Must(op.plan(mesh, (*places)[i], (*patches)[i]));
+  Mesh operated = mesh.Clone(), replaced = mesh.Clone();
+  operated.BeginBatch();
+  OperateAt(operated, op, *places);
+  replaced.BeginBatch();
+  ReplaceByElements(replaced, *patches);
+  for (EntityKind kind : kEntityKinds) {
+    CheckSame(operated.NumLive(kind) == replaced.NumLive(kind), op.name.c_str(), "by_elements");
+  }
+  const std::string name = "edit/" + op.name;
+  Register(name, mesh, places->size(), [op, places](Mesh& copy) { OperateAt(copy, op, *places); });
+  Register(name + "/by_elements", mesh, places->size(),
+           [patches](Mesh& copy) { ReplaceByElements(copy, *patches); });
+}
+
+}  // namespace
+
+void RegisterOperators(const Fixture& fixture) {
+  for (const Operator& op : OperatorsFor(fixture.input.type)) RegisterOperator(fixture.mesh, op);
+}
+
+}  // namespace dynmesh::bench
