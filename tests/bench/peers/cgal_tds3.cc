@@ -125,7 +125,7 @@ size_t SwapFaces(EditedTds3& edited) {
   return done;
 }
 
-void RegisterEdits(const Fixture& fixture, const std::string& operator_name, size_t (*edit)(EditedTds3&)) {
+void RegisterPeerEdits(const Fixture& fixture, const std::string& operator_name, size_t (*edit)(EditedTds3&)) {
   for (const Operator& op : OperatorsFor(fixture.input.type)) {
     if (op.name != operator_name) continue;
     const auto places = std::make_shared<const std::vector<Slot>>(PlacesFor(fixture.mesh, op, kPlaces));
@@ -153,8 +153,8 @@ void RegisterCgalTds3(const Fixture& fixture) {
                    [peer] { return SumVertexCells(*peer); });
   RegisterPeerTask("cgal_tds3/relation/e_c", SumOf(flat, kEdgeCells), [peer] { return SumEdgeCells(*peer); });
   RegisterPeerTask("cgal_tds3/relation/c_c", SumOf(flat, kCellCells), [peer] { return SumCellCells(*peer); });
-  RegisterEdits(fixture, "split", SplitEdges);
-  RegisterEdits(fixture, "swap_face", SwapFaces);
+  RegisterPeerEdits(fixture, "split", SplitEdges);
+  RegisterPeerEdits(fixture, "swap_face", SwapFaces);
   RegisterPeerTask("cgal_tds3/boundary/vertices", SumOf(fixture.mesh.Boundary(EntityKind::kVertex)),
                    [peer] { return SumBoundaryVertices(*peer); });
 }

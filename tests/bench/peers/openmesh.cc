@@ -96,7 +96,7 @@ size_t Collapse(EditedSurface& edited) {
   return done;
 }
 
-void RegisterEdits(const Fixture& fixture) {
+void RegisterPeerEdits(const Fixture& fixture) {
   const std::pair<const char*, size_t (*)(EditedSurface&)> edits[] = {
       {"split", Split}, {"swap_edge", Flip}, {"collapse", Collapse}};
   for (const Operator& op : OperatorsFor(fixture.input.type)) {
@@ -121,7 +121,7 @@ void RegisterOpenMesh(const Fixture& fixture) {
                    [peer] { return SumVertexVertices(*peer); });
   RegisterPeerTask("openmesh/relation/v_f", SumOf(fixture.flat, kVertexFaces),
                    [peer] { return SumVertexFaces(*peer); });
-  RegisterEdits(fixture);
+  RegisterPeerEdits(fixture);
   RegisterPeerTask("openmesh/boundary/vertices", SumOf(fixture.mesh.Boundary(EntityKind::kVertex)),
                    [peer] { return SumBoundaryVertices(*peer); });
 }
