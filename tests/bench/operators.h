@@ -25,7 +25,7 @@ std::vector<Operator> OperatorsFor(ElementType type);
 std::vector<Slot> PlacesFor(const Mesh& mesh, const Operator& op, size_t count);
 
 /// As many as are timed.
-inline constexpr size_t kPlaces = 10'000;
+inline constexpr size_t kPlaces = 1000;
 
 }  // namespace dynmesh::bench
 
