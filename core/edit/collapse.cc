@@ -136,11 +136,13 @@ class TwinCheck {
  public:
   TwinCheck(const Mesh& mesh, VertexId kept, VertexId gone) : mesh_(mesh), kept_(kept), gone_(gone) {}
 
-  absl::Status Check(const Patch& patch) const {
+  /// Adds what it looked at to the patch's work; TOO_MANY_ELEMENTS beyond kMaxPatchWork.
+  absl::Status Check(Patch& patch) const {
     for (size_t i = 0; i < patch.added.size(); ++i) {
       const EntityId parent = patch.removed[patch.parents[i]];
       if (parent.kind != EntityKind::kCell) continue;
-      const CellId twin = TwinOf(patch.added[i], CellId(parent.slot));
+      const CellId twin = TwinOf(patch.added[i], CellId(parent.slot), patch.work);
+      if (patch.work > kMaxPatchWork) return TooManyElements(gone_);
       if (!twin.valid()) continue;
       return Refuse(reason::kLinkCondition,
                     absl::StrCat("cell ", parent.slot, " would become equal to cell ", twin.slot()),
@@ -150,18 +152,18 @@ class TwinCheck {
   }
 
  private:
-  CellId TwinOf(const NewElement& element, CellId parent) const {
+  CellId TwinOf(const NewElement& element, CellId parent, uint64_t& work) const {
     const ElementTemplate& shape = TemplateOf(element.type);
-    const auto vertices = element.vertices();
     for (int i = 0; i < shape.num_faces; ++i) {
-      std::array<VertexId, kMaxFaceVertices> cycle;
-      for (int k = 0; k < shape.faces[i].size; ++k) cycle[k] = vertices[shape.faces[i].vertices[k]];
-      const auto span = absl::MakeConstSpan(cycle.data(), shape.faces[i].size);
+      const FaceVertices face(shape.faces[i], element.vertices());
+      const auto span = face.span();
       const bool is_new =
           std::any_of(span.begin(), span.end(), [](VertexId v) { return v.slot() & kNewVertex; });
       if (is_new || Contains(span, kept_)) continue;
       const FaceId f = mesh_.FindFace(span);
-      return f.valid() ? TwinAt(f, element, parent) : CellId();
+      if (!f.valid()) return CellId();
+      work += mesh_.IncidentCells(f).size();
+      return TwinAt(f, element, parent);
     }
     return CellId();
   }
@@ -253,10 +255,8 @@ class Collapser {
     size_t num_faces = 0, merged = 0;
     bool cone = true;
     for (int i = 0; i < shape.num_faces; ++i) {
-      std::array<VertexId, kMaxFaceVertices> cycle;
-      const LocalFace& face = shape.faces[i];
-      for (int k = 0; k < face.size; ++k) cycle[k] = vertices[face.vertices[k]];
-      const auto span = absl::MakeConstSpan(cycle.data(), face.size);
+      const FaceVertices face(shape.faces[i], vertices);
+      const auto span = face.span();
       if (AreOpposite(span, kept_, gone_)) return RefuseCorners(element);
       const Polygon shrunk = Shrunk(span);
       merged += shrunk.size < span.size();
@@ -278,14 +278,9 @@ class Collapser {
 
   /// A vertex in the middle of what is left of a cell.
   VertexId AddMiddle(absl::Span<const VertexId> vertices) {
-    Patch::NewVertex middle{{0, 0, 0}, {}};
-    const double weight = 1.0 / (vertices.size() - 1);
-    for (VertexId v : vertices) {
-      if (v == gone_) continue;
-      middle.position = middle.position + weight * PositionAfter(mesh_, patch_, v);
-      middle.blend.vertices.push_back(v);
-      middle.blend.weights.push_back(weight);
-    }
+    std::array<VertexId, kMaxElementVertices> left;
+    const auto count = std::remove_copy(vertices.begin(), vertices.end(), left.begin(), gone_) - left.begin();
+    Patch::NewVertex middle = MiddleOf(mesh_, patch_, absl::MakeConstSpan(left.data(), count));
     return patch_.AddVertex(middle.position, std::move(middle.blend));
   }
 

@@ -36,7 +36,8 @@ struct CollapsePlace {
 /// link), so manifold stays manifold and the Euler characteristic what it is. Errors: FAILED_PRECONDITION
 /// LINK_CONDITION with the vertices that would close a gap, or the faces that would merge; BOUNDARY where an
 /// inner edge joins two boundary vertices; NOT_SIMPLEX where the ends are opposite corners of a quad or cell;
-/// DEGENERATE_ELEMENT. REQUIRES: `e` is live. Cost: linear in the stars of both ends, times their look-ups.
+/// TOO_MANY_ELEMENTS; DEGENERATE_ELEMENT. REQUIRES: `e` is live. Cost: linear in the stars of both ends,
+/// times their look-ups.
 absl::Status PlanCollapseEdge(const Mesh& mesh, EdgeId e, const CollapsePlace& place, Patch& patch);
 
 }  // namespace dynmesh

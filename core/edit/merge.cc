@@ -12,9 +12,6 @@
 namespace dynmesh {
 namespace {
 
-/// Entities that one merge may look at: a second's work.
-constexpr uint64_t kMaxWork = 50'000'000;
-
 /// Looks for elements that others would equal.
 class TwinFinder {
  public:
@@ -97,11 +94,7 @@ absl::Status PlanMergeVertices(const Mesh& mesh, VertexId kept, VertexId gone,
     patch.Remove(id);
     patch.Add(mesh.Type(id), absl::MakeConstSpan(moved.data(), vertices.size()));
     const EntityId twin = twins.Find(patch.added.back(), patch.work);
-    if (patch.work > kMaxWork) {
-      status = Refuse(reason::kTooManyElements,
-                      absl::StrCat("vertex ", gone.slot(), " has too many elements to merge it"),
-                      EntityKind::kVertex, {gone.slot()});
-    }
+    if (patch.work > kMaxPatchWork) status = TooManyElements(gone);
     if (twin.slot == kNoSlot) return;
     status = Refuse(reason::kDuplicateElement,
                     absl::StrCat(EntityKindName(id.kind), " ", id.slot, " would equal ", twin.slot), id.kind,

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/mesh/vector.h"
+
 namespace dynmesh {
 
 void Patch::Clear() {
@@ -29,6 +31,17 @@ void Patch::Add(ElementType type, absl::Span<const VertexId> vertices) {
 void Patch::AddChildOf(size_t parent, ElementType type, absl::Span<const VertexId> vertices) {
   added.emplace_back(type, vertices);
   parents.push_back(parent);
+}
+
+Patch::NewVertex MiddleOf(const Mesh& mesh, const Patch& patch, absl::Span<const VertexId> vertices) {
+  Patch::NewVertex middle{{0, 0, 0}, {}};
+  const double weight = 1.0 / vertices.size();
+  for (VertexId v : vertices) {
+    middle.position = middle.position + weight * PositionAfter(mesh, patch, v);
+    middle.blend.vertices.push_back(v);
+    middle.blend.weights.push_back(weight);
+  }
+  return middle;
 }
 
 Point PositionAfter(const Mesh& mesh, const Patch& patch, VertexId v) {

@@ -15,6 +15,9 @@ namespace dynmesh {
 /// do.)
 inline constexpr Slot kNewVertex = 0x80000000u;
 
+/// Entities that one operator may look at where that is more than its star: a second's work or two.
+inline constexpr uint64_t kMaxPatchWork = 50'000'000;
+
 /// Vertices that a new one lies between, with weights that add up to 1: what its attributes are made of.
 struct Blend {
   absl::InlinedVector<VertexId, 4> vertices;
@@ -60,6 +63,9 @@ struct Patch {
   /// In place of removed[parent], among others.
   void AddChildOf(size_t parent, ElementType type, absl::Span<const VertexId> vertices);
 };
+
+/// A vertex in the middle of `vertices`, as they will be.
+Patch::NewVertex MiddleOf(const Mesh& mesh, const Patch& patch, absl::Span<const VertexId> vertices);
 
 /// Where a vertex of the mesh or of the patch will be.
 Point PositionAfter(const Mesh& mesh, const Patch& patch, VertexId v);

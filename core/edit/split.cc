@@ -28,7 +28,8 @@ class EdgeSplitter {
     } else if (element.kind == EntityKind::kFace) {
       FanOfFace(vertices);
     } else {
-      FanOfCell(type, vertices);
+      AddCones(
+          type, vertices, middle_, [this](auto face) { return HasEdge(face); }, patch_);
     }
   }
 
@@ -51,41 +52,10 @@ class EdgeSplitter {
     }
   }
 
-  void FanOfCell(ElementType type, absl::Span<const VertexId> vertices) {
-    const ElementTemplate& shape = TemplateOf(type);
-    for (int i = 0; i < shape.num_faces; ++i) {
-      std::array<VertexId, kMaxFaceVertices> face;
-      for (int k = 0; k < shape.faces[i].size; ++k) face[k] = vertices[shape.faces[i].vertices[k]];
-      const auto span = absl::MakeConstSpan(face.data(), shape.faces[i].size);
-      if (!HasEdge(span)) AddCone(span, middle_, patch_);
-    }
-  }
-
   const Mesh& mesh_;
   const VertexId a_, b_, middle_;
   Patch& patch_;
 };
-
-/// Means of the vertices of an element.
-Patch::NewVertex Centroid(const Mesh& mesh, absl::Span<const VertexId> vertices) {
-  Patch::NewVertex centroid{{0, 0, 0}, {}};
-  const double weight = 1.0 / vertices.size();
-  for (VertexId v : vertices) {
-    centroid.position = centroid.position + weight * mesh.Position(v);
-    centroid.blend.vertices.push_back(v);
-    centroid.blend.weights.push_back(weight);
-  }
-  return centroid;
-}
-
-void ConesOfCell(ElementType type, absl::Span<const VertexId> vertices, VertexId apex, Patch& patch) {
-  const ElementTemplate& shape = TemplateOf(type);
-  for (int i = 0; i < shape.num_faces; ++i) {
-    std::array<VertexId, kMaxFaceVertices> face;
-    for (int k = 0; k < shape.faces[i].size; ++k) face[k] = vertices[shape.faces[i].vertices[k]];
-    AddCone(absl::MakeConstSpan(face.data(), shape.faces[i].size), apex, patch);
-  }
-}
 
 /// Whether cells use a face, or faces a wire, or what it is a duplicate of.
 bool IsUsed(const Mesh& mesh, EntityId element) {
@@ -131,11 +101,12 @@ absl::Status PlanSplitElement(const Mesh& mesh, EntityId element, const absl::op
                   element.kind, {element.slot});
   }
   const auto vertices = mesh.VerticesOf(element);
-  Patch::NewVertex middle = Centroid(mesh, vertices);
+  Patch::NewVertex middle = MiddleOf(mesh, patch, vertices);
   const VertexId m = patch.AddVertex(position.value_or(middle.position), std::move(middle.blend));
   patch.Remove(element);
   if (element.kind == EntityKind::kCell) {
-    ConesOfCell(mesh.Type(element), vertices, m, patch);
+    AddCones(
+        mesh.Type(element), vertices, m, [](auto) { return false; }, patch);
   } else if (element.kind == EntityKind::kEdge) {
     patch.Add(ElementType::kWireEdge, {vertices[0], m});
     patch.Add(ElementType::kWireEdge, {m, vertices[1]});

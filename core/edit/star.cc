@@ -91,6 +91,11 @@ std::array<VertexId, 2> EndsFrom(const Mesh& mesh, EdgeId e, VertexId origin) {
                            : std::array<VertexId, 2>{ends[0], ends[1]};
 }
 
+absl::Status TooManyElements(VertexId v) {
+  return Refuse(reason::kTooManyElements, absl::StrCat("vertex ", v.slot(), " has too many elements"),
+                EntityKind::kVertex, {v.slot()});
+}
+
 absl::Status Refuse(absl::string_view reason, absl::string_view message, EntityKind kind,
                     absl::Span<const Slot> ids) {
   return FailedPrecondition(reason, message,

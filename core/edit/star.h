@@ -44,6 +44,9 @@ bool Contains(absl::Span<const VertexId> vertices, VertexId v);
 /// The ends of an edge from `origin` on, or as they are stored where that is invalid.
 std::array<VertexId, 2> EndsFrom(const Mesh& mesh, EdgeId e, VertexId origin);
 
+/// TOO_MANY_ELEMENTS naming a vertex.
+absl::Status TooManyElements(VertexId v);
+
 /// FAILED_PRECONDITION with the kind and ids of what stands in the way.
 absl::Status Refuse(absl::string_view reason, absl::string_view message, EntityKind kind,
                     absl::Span<const Slot> ids);

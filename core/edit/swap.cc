@@ -246,6 +246,7 @@ absl::Status PlanSwapFace(const Mesh& mesh, FaceId f, Patch& patch) {
     return Refuse(reason, absl::StrCat("face ", f.slot(), " ", why), EntityKind::kFace, {f.slot()});
   };
   const auto cells = mesh.IncidentCells(f);
+  patch.work += mesh.IncidentFaces(mesh.Edges(f)[0]).size();
   if (HasElementAt(mesh, f))
     return refuse(reason::kElementInTheWay, "is an element itself, or a duplicate of it is");
   if (cells.size() < 2) return refuse(reason::kBoundary, "has one cell");

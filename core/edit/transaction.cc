@@ -1,7 +1,6 @@
 #include "core/edit/transaction.h"
 
 #include <algorithm>
-#include <cmath>
 #include <new>
 #include <stdexcept>
 #include <string>
@@ -15,6 +14,7 @@
 #include "core/edit/swap.h"
 #include "core/mesh/spatial_order.h"
 #include "core/mesh/validate.h"
+#include "core/mesh/vector.h"
 
 namespace dynmesh {
 namespace {
@@ -24,6 +24,9 @@ constexpr size_t kFewVertices = 32;
 
 /// Of an operator, whatever it looks at.
 constexpr uint64_t kWorkOfItem = 10;
+
+/// Of each element that it removes or adds: checking it, linking it, and perhaps putting it back.
+constexpr uint64_t kWorkToReplace = 10;
 
 absl::Status BadLength(absl::string_view what, size_t expected, size_t actual) {
   return InvalidArgument(reason::kBadArrayLength,
@@ -221,7 +224,7 @@ class BatchApplier {
 
   /// Counts what was planned, so that few items cannot take long or fill the memory.
   absl::Status Charge() {
-    work_ += kWorkOfItem + patch_.work;
+    work_ += kWorkOfItem + patch_.work + kWorkToReplace * (patch_.removed.size() + patch_.added.size());
     result_.num_made += patch_.added.size();
     if (work_ > options_.max_work) return LimitExceeded("max_batch_work", options_.max_work, work_);
     if (result_.num_made > options_.max_made) {
@@ -285,8 +288,7 @@ class BatchApplier {
     if (!positions.empty() && positions.size() != count)
       return BadLength("positions", count, positions.size());
     for (size_t i = 0; i < positions.size(); ++i) {
-      const auto& [x, y, z] = positions[i];
-      if (std::isfinite(x) && std::isfinite(y) && std::isfinite(z)) continue;
+      if (IsFinite(positions[i])) continue;
       return InvalidArgument(reason::kNonFinite, "a coordinate is NaN or infinite",
                              {{"field", "positions"}, {"index", absl::StrCat(i)}});
     }
@@ -411,9 +413,7 @@ class BatchApplier {
 
   /// Hilbert order, or none when a position is not finite and so will be refused.
   static Permutation FiniteOrder(absl::Span<const Point> positions) {
-    const bool finite = std::all_of(positions.begin(), positions.end(), [](const Point& p) {
-      return std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]);
-    });
+    const bool finite = std::all_of(positions.begin(), positions.end(), IsFinite);
     return finite ? HilbertOrder(positions) : Permutation();
   }
 

@@ -1,10 +1,10 @@
 #include "core/mesh/bulk_build.h"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "core/mesh/vector.h"
 
 namespace dynmesh {
 namespace {
@@ -14,8 +14,6 @@ constexpr uint64_t kPasses = 3;
 /// Input is scattered if fewer of its neighbours in order share a vertex.
 constexpr double kCoherentShare = 0.5;
 constexpr Slot kFewCells = 50'000;  ///< everything about so many stays in the cache
-
-bool IsFinite(const Point& p) { return std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]); }
 
 /// rows[k] = old rows[order[k]], for rows of `stride` items.
 template <typename T>

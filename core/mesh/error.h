@@ -53,19 +53,19 @@ inline constexpr char kChecksumMismatch[] = "CHECKSUM_MISMATCH";
 inline constexpr char kInternal[] = "INTERNAL";
 
 // Why an edit operator refuses; the table of operators in core/edit says which gives which.
-inline constexpr char kLinkCondition[] = "LINK_CONDITION";      // parts would merge that are none of the edge's
-inline constexpr char kBoundary[] = "BOUNDARY";                 // only possible inside, or would close the boundary
+inline constexpr char kLinkCondition[] = "LINK_CONDITION";  // parts would merge that are none of the edge's
+inline constexpr char kBoundary[] = "BOUNDARY";  // only possible inside, or would close the boundary
 inline constexpr char kNonManifoldEdge[] = "NON_MANIFOLD_EDGE";
 inline constexpr char kNonManifoldFace[] = "NON_MANIFOLD_FACE";
-inline constexpr char kNotSimplex[] = "NOT_SIMPLEX";            // only defined for triangles and tetrahedra
+inline constexpr char kNotSimplex[] = "NOT_SIMPLEX";  // only defined for triangles and tetrahedra
 inline constexpr char kDegenerateElement[] = "DEGENERATE_ELEMENT";  // an element there names a vertex twice
-inline constexpr char kElementInTheWay[] = "ELEMENT_IN_THE_WAY";    // a wire or dangling face would have to go
-inline constexpr char kEdgeExists[] = "EDGE_EXISTS";            // the edge that it would make is there
+inline constexpr char kElementInTheWay[] = "ELEMENT_IN_THE_WAY";  // a wire or dangling face would have to go
+inline constexpr char kEdgeExists[] = "EDGE_EXISTS";              // the edge that it would make is there
 inline constexpr char kFaceExists[] = "FACE_EXISTS";
 inline constexpr char kInconsistentOrientation[] = "INCONSISTENT_ORIENTATION";  // neighbours turn differently
-inline constexpr char kTooManyElements[] = "TOO_MANY_ELEMENTS";  // at the edge
+inline constexpr char kTooManyElements[] = "TOO_MANY_ELEMENTS";                 // at the edge
 inline constexpr char kWouldInvert[] = "WOULD_INVERT";
-inline constexpr char kWouldDegrade[] = "WOULD_DEGRADE";        // quality would fall below what was asked for
+inline constexpr char kWouldDegrade[] = "WOULD_DEGRADE";  // quality would fall below what was asked for
 inline constexpr char kWouldChangeTopology[] = "WOULD_CHANGE_TOPOLOGY";
 }  // namespace reason
 

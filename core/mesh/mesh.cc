@@ -1,9 +1,9 @@
 #include "core/mesh/mesh.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "absl/strings/str_cat.h"
+#include "core/mesh/vector.h"
 
 namespace dynmesh {
 namespace {
@@ -31,8 +31,6 @@ EdgeSources MakeEdgeSources() {
 }
 
 const EdgeSources kEdgeSources = MakeEdgeSources();
-
-bool IsFinite(const Point& p) { return std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]); }
 
 absl::Status BornLater(EntityId id, Stamp born) {
   return MakeError(absl::StatusCode::kNotFound, reason::kEntityRemoved,

@@ -11,17 +11,6 @@ namespace {
 /// Beyond as many faces on a smart edge, a face is looked for round the least used of its edges.
 constexpr uint32_t kCrowded = 16;
 
-/// Vertices of one face of a cell, in the template's outward order.
-struct FaceVertices {
-  FaceVertices(const LocalFace& face, absl::Span<const VertexId> cell) : size(face.size) {
-    for (int k = 0; k < size; ++k) vertices[k] = cell[face.vertices[k]];
-  }
-  absl::Span<const VertexId> span() const { return absl::MakeConstSpan(vertices.data(), size); }
-
-  int size;
-  std::array<VertexId, kMaxFaceVertices> vertices;
-};
-
 Slot XorOf(const VertexId* vertices, size_t size) {
   const Slot first_three = vertices[0].slot() ^ vertices[1].slot() ^ vertices[2].slot();
   return size == 4 ? first_three ^ vertices[3].slot() : first_three;

@@ -29,9 +29,8 @@ int BitsFor(size_t num_points) {
 
 /// Skilling's transform: grid coordinates into the transposed Hilbert index.
 Axes Transpose(Axes x, int bits) {
-  const auto bit = [](const Lanes& v, int b) {
-    return Lanes{} - ((v >> b) & 1);
-  };  // all ones where it is set
+  // All ones where a bit is set.
+  const auto bit = [](const Lanes& v, int b) { return Lanes{} - ((v >> b) & 1); };
   for (int b = bits - 1; b > 0; --b) {
     const uint32_t p = (uint32_t{1} << b) - 1;
     for (int axis = 0; axis < 3; ++axis) {

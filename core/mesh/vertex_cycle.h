@@ -30,6 +30,17 @@ struct FaceCode {
   }
 };
 
+/// Vertices of one face of a cell, in the template's outward order.
+struct FaceVertices {
+  FaceVertices(const LocalFace& face, absl::Span<const VertexId> cell) : size(face.size) {
+    for (int k = 0; k < size; ++k) vertices[k] = cell[face.vertices[k]];
+  }
+  absl::Span<const VertexId> span() const { return absl::MakeConstSpan(vertices.data(), size); }
+
+  int size;
+  std::array<VertexId, kMaxFaceVertices> vertices;
+};
+
 /// Whether a vertex is named twice.
 inline bool HasRepeats(absl::Span<const VertexId> vertices) {
   for (size_t i = 1; i < vertices.size(); ++i) {

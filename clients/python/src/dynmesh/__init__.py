@@ -15,7 +15,8 @@ from .checksum import Checksum
 from .client import Client, connect
 from .daemon import Daemon, launch
 from .delta import Delta
-from .edit import EditBatch, EditResult, Lineage, Refusal, Transaction
+from .edit import EditBatch, Transaction
+from .edit_result import EditResult, Lineage, Refusal
 from .edit_stream import EditStream
 from .errors import (
     AbortedError,

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
-from dataclasses import dataclass
 from types import TracebackType
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from .arrays import (
     Ids,
     as_id_rows,
     as_ids,
-    as_integers,
     as_number,
     as_numbers,
     as_points,
@@ -24,119 +22,22 @@ from .arrays import (
     from_bytes,
     u32_bytes,
 )
-from .checksum import Checksum
 from .columns import as_values, make_spec, values_bytes
+from .edit_result import EditResult, lineage_from_proto, refusal_from_proto
 from .errors import InvalidArgumentError
-from .info import Counts, MeshWarning, checksum_from_proto, counts_from_proto, warning_from_proto
+from .handles import NUMBER_MASK, handles_from, to_wire
+from .info import checksum_from_proto, counts_from_proto, warning_from_proto
 from .kinds import KindLike, TypeLike, as_element_type, as_kind
 from .v1 import edits_pb2, types_pb2
 
-# On the wire, vertex id NEW_VERTEX | k is the k-th vertex that the batch adds. A handle is that, and the number of its
-# batch in the upper half of an int64.
-NEW_VERTEX = 0x80000000
-_WIRE_MASK = 0xFFFFFFFF
-_NUMBER_MASK = 0x7FFFFFFF
 _batch_numbers = itertools.count(1)
-
-
-@dataclass(frozen=True)
-class Refusal:
-    """Why an item of an operator was passed over.
-
-    Attributes
-    ----------
-    index : int
-        The item, in the arrays that the operator was given.
-    reason : str
-        "LINK_CONDITION", "WOULD_INVERT", ...
-    message : str
-    metadata : dict of str to str
-        ``kind`` and ``ids`` of what stands in the way, among others.
-    """
-
-    index: int
-    reason: str
-    message: str
-    metadata: dict[str, str]
-
-
-@dataclass(frozen=True)
-class Lineage:
-    """Elements that an operator made, in order, and those whose places they took, which are of the same kinds.
-
-    An element may have been replaced again by a later item: walk in order, ``origin[element] = origin.get(parent,
-    parent)``, to find what each came from.
-
-    Attributes
-    ----------
-    kinds : uint8[n]
-        Dimensions: 1 wire edges, 2 faces, 3 cells.
-    elements : uint32[n]
-    parents : uint32[n]
-    """
-
-    kinds: NDArray[np.uint8]
-    elements: Ids
-    parents: Ids
-
-
-@dataclass(frozen=True)
-class EditResult:
-    """What a batch did or, if it was only validated, would have done.
-
-    Attributes
-    ----------
-    revision : int
-        After the batch; of ``validate_only`` the revision that it was checked against.
-    new_ids : tuple of uint32[n]
-        For each edit the ids of what it added, in order.
-    new_vertices : uint32[n]
-        Ids of the vertices that `add_vertices`, `split_edges` and `split_elements` added, in order; 0xffffffff for
-        those of items that were passed over.
-    skipped : tuple of uint32[n]
-        For each edit the items that were passed over, with ``skip_refused``.
-    refusals : tuple of tuple of Refusal
-        For each edit why: of the first 100 of the batch.
-    lineage : tuple of Lineage
-        For each edit which elements it made of which, with ``report_lineage``.
-    batch_number : int
-        Tells the batch's handles from those of others.
-    """
-
-    revision: int
-    new_ids: tuple[Ids, ...]
-    new_vertices: Ids
-    checksum: Checksum
-    counts: Counts
-    warnings: tuple[MeshWarning, ...]
-    batch_number: int
-    skipped: tuple[Ids, ...] = ()
-    refusals: tuple[tuple[Refusal, ...], ...] = ()
-    lineage: tuple[Lineage, ...] = ()
-
-    def resolve(self, vertices: ArrayLike) -> Ids:
-        """Vertex ids for handles that `EditBatch.add_vertices` gave out; ids stay as they are.
-
-        Parameters
-        ----------
-        vertices : integers, any shape
-
-        Raises
-        ------
-        InvalidArgumentError
-            FOREIGN_HANDLE: a handle of another batch.
-        """
-        ids = np.array(_to_wire(vertices, self.batch_number), dtype=np.uint32)
-        handles = (ids & NEW_VERTEX) != 0
-        ids[handles] = self.new_vertices[ids[handles] & ~np.uint32(NEW_VERTEX)]
-        return ids
 
 
 class EditBatch:
     """Collects edits in order. Nothing is sent; the methods check shapes and types only."""
 
     def __init__(self) -> None:
-        self._number = next(_batch_numbers) & _NUMBER_MASK
+        self._number = next(_batch_numbers) & NUMBER_MASK
         self._edits: list[edits_pb2.Edit] = []
         self._num_new_vertices = 0
         self._adds_vertices: list[int] = []
@@ -254,12 +155,8 @@ class EditBatch:
             ``skip_refused``, `EditResult.resolve` gives 0xffffffff.
         """
         names, count = self._edges(edges, ends)
-        message = edits_pb2.SplitEdges(
-            edges=names,
-            parameters=_parameters(parameters, count),
-            positions=_positions(positions, count),
-            limits=_limits(allow_inversion, min_quality),
-        )
+        places = _places(parameters, positions, count)
+        message = edits_pb2.SplitEdges(edges=names, limits=_limits(allow_inversion, min_quality), **places)
         return self._append_vertices(count, split_edges=message)
 
     def collapse_edges(
@@ -278,12 +175,8 @@ class EditBatch:
         id. The default is 0.5, but where just one end is on the boundary that end, so that the boundary stays.
         """
         names, count = self._edges(edges, ends)
-        message = edits_pb2.CollapseEdges(
-            edges=names,
-            parameters=_parameters(parameters, count),
-            positions=_positions(positions, count),
-            limits=_limits(allow_inversion, min_quality),
-        )
+        places = _places(parameters, positions, count)
+        message = edits_pb2.CollapseEdges(edges=names, limits=_limits(allow_inversion, min_quality), **places)
         return self._append(collapse_edges=message)
 
     def swap_edges(
@@ -381,16 +274,16 @@ class EditBatch:
             warnings=tuple(warning_from_proto(w) for w in reply.warnings),
             batch_number=self._number,
             skipped=tuple(from_bytes(result.skipped, "<u4") for result in reply.results),
-            refusals=tuple(tuple(map(_refusal, result.refusals)) for result in reply.results),
-            lineage=tuple(map(_lineage, reply.results)),
+            refusals=tuple(tuple(map(refusal_from_proto, result.refusals)) for result in reply.results),
+            lineage=tuple(map(lineage_from_proto, reply.results)),
         )
 
     def _append_vertices(self, count: int, **kind: Any) -> Ids:
         """Appends an edit that adds vertices; returns their handles."""
-        first = self._number << 32 | NEW_VERTEX + self._num_new_vertices
+        handles = handles_from(self._number, self._num_new_vertices, count)
         self._adds_vertices.append(self._append(**kind))
         self._num_new_vertices += count
-        return np.arange(first, first + count, dtype=np.int64)
+        return handles
 
     def _edges(self, edges: ArrayLike | None, ends: ArrayLike | None) -> tuple[edits_pb2.EdgeNames, int]:
         if (edges is None) == (ends is None):
@@ -402,7 +295,7 @@ class EditBatch:
         return edits_pb2.EdgeNames(ends=u32_bytes(rows)), len(rows)
 
     def _wire(self, vertices: ArrayLike) -> ArrayLike:
-        return _to_wire(vertices, self._number)
+        return to_wire(vertices, self._number)
 
     def _append(self, **kind: Any) -> int:
         self._edits.append(edits_pb2.Edit(**kind))
@@ -458,33 +351,15 @@ class Transaction(EditBatch):
             raise RuntimeError("the batch has ended with its with block: begin another with session.edit()")
 
 
-def _to_wire(vertices: ArrayLike, batch_number: int) -> Any:
-    """`vertices` with handles as they are on the wire; what holds none is left to be checked as it is."""
-    array = as_integers(vertices)
-    if array is None:
-        return vertices
-    handles = array > _WIRE_MASK
-    if not handles.any():
-        return array
-    foreign = array[handles] >> 32 != batch_number
-    if foreign.any():
-        index = int(np.flatnonzero(handles)[np.flatnonzero(foreign)[0]])
-        raise InvalidArgumentError(
-            "a vertex handle of another batch, or no id at all: `EditResult.resolve` of the batch that gave it out "
-            "turns it into an id",
-            reason="FOREIGN_HANDLE",
-            metadata={"index": str(index)},
-        )
-    return np.where(handles, array & _WIRE_MASK, array)
-
-
 def _limits(allow_inversion: bool, min_quality: float) -> edits_pb2.OperatorLimits:
     quality = as_number(min_quality, "min_quality")
     return edits_pb2.OperatorLimits(allow_inversion=bool(allow_inversion), min_quality=quality)
 
 
-def _parameters(parameters: ArrayLike | None, count: int) -> bytes:
-    return b"" if parameters is None else f64_bytes(as_numbers(parameters, count, "parameters"))
+def _places(parameters: ArrayLike | None, positions: ArrayLike | None, count: int) -> dict[str, bytes]:
+    """The fields that say where on, or off, each edge."""
+    on_edge = b"" if parameters is None else f64_bytes(as_numbers(parameters, count, "parameters"))
+    return {"parameters": on_edge, "positions": _positions(positions, count)}
 
 
 def _positions(positions: ArrayLike | None, count: int) -> bytes:
@@ -493,15 +368,6 @@ def _positions(positions: ArrayLike | None, count: int) -> bytes:
     points = as_points(positions)
     _check_same_length("positions", len(points), count)
     return f64_bytes(points)
-
-
-def _refusal(item: edits_pb2.SkippedItem) -> Refusal:
-    return Refusal(item.index, item.error.reason, item.error.message, dict(item.error.metadata))
-
-
-def _lineage(result: edits_pb2.EditResult) -> Lineage:
-    kinds = from_bytes(result.element_kinds, "u1")
-    return Lineage(kinds - 1, from_bytes(result.element_ids, "<u4"), from_bytes(result.parent_ids, "<u4"))
 
 
 def _check_same_length(what: str, length: int, wanted: int) -> None:

@@ -12,7 +12,8 @@ from typing import Any
 
 import grpc
 
-from .edit import EditBatch, EditResult
+from .edit import EditBatch
+from .edit_result import EditResult
 from .errors import CancelledError, DynmeshError, from_rpc_error, make_error
 from .v1 import edits_pb2
 

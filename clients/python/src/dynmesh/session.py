@@ -13,7 +13,8 @@ from numpy.typing import ArrayLike
 from ._calls import Caller
 from .arrays import as_int64
 from .delta import HAS_NATIVE
-from .edit import EditBatch, EditResult, Transaction
+from .edit import EditBatch, Transaction
+from .edit_result import EditResult
 from .edit_stream import EditStream
 from .errors import InvalidArgumentError, UnimplementedError
 from .files import PathLike, read_mesh

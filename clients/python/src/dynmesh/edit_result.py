@@ -1,0 +1,118 @@
+"""What a batch of edits did."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .arrays import Ids, from_bytes
+from .checksum import Checksum
+from .handles import NEW_VERTEX, to_wire
+from .info import Counts, MeshWarning
+from .v1 import edits_pb2
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """Why an item of an operator was passed over.
+
+    Attributes
+    ----------
+    index : int
+        The item, in the arrays that the operator was given.
+    reason : str
+        "LINK_CONDITION", "WOULD_INVERT", ...
+    message : str
+    metadata : dict of str to str
+        ``kind`` and ``ids`` of what stands in the way, among others.
+    """
+
+    index: int
+    reason: str
+    message: str
+    metadata: dict[str, str]
+
+
+@dataclass(frozen=True)
+class Lineage:
+    """Elements that an operator made, in order, and those whose places they took, which are of the same kinds.
+
+    An element may have been replaced again by a later item: walk in order, ``origin[element] = origin.get(parent,
+    parent)``, to find what each came from.
+
+    Attributes
+    ----------
+    kinds : uint8[n]
+        Dimensions: 1 wire edges, 2 faces, 3 cells.
+    elements : uint32[n]
+    parents : uint32[n]
+    """
+
+    kinds: NDArray[np.uint8]
+    elements: Ids
+    parents: Ids
+
+
+@dataclass(frozen=True)
+class EditResult:
+    """What a batch did or, if it was only validated, would have done.
+
+    Attributes
+    ----------
+    revision : int
+        After the batch; of ``validate_only`` the revision that it was checked against.
+    new_ids : tuple of uint32[n]
+        For each edit the ids of what it added, in order.
+    new_vertices : uint32[n]
+        Ids of the vertices that `add_vertices`, `split_edges` and `split_elements` added, in order; 0xffffffff for
+        those of items that were passed over.
+    skipped : tuple of uint32[n]
+        For each edit the items that were passed over, with ``skip_refused``.
+    refusals : tuple of tuple of Refusal
+        For each edit why: of the first 100 of the batch.
+    lineage : tuple of Lineage
+        For each edit which elements it made of which, with ``report_lineage``.
+    batch_number : int
+        Tells the batch's handles from those of others.
+    """
+
+    revision: int
+    new_ids: tuple[Ids, ...]
+    new_vertices: Ids
+    checksum: Checksum
+    counts: Counts
+    warnings: tuple[MeshWarning, ...]
+    batch_number: int
+    skipped: tuple[Ids, ...] = ()
+    refusals: tuple[tuple[Refusal, ...], ...] = ()
+    lineage: tuple[Lineage, ...] = ()
+
+    def resolve(self, vertices: ArrayLike) -> Ids:
+        """Vertex ids for handles that `EditBatch.add_vertices` gave out; ids stay as they are.
+
+        Parameters
+        ----------
+        vertices : integers, any shape
+
+        Raises
+        ------
+        InvalidArgumentError
+            FOREIGN_HANDLE: a handle of another batch.
+        """
+        ids = np.array(to_wire(vertices, self.batch_number), dtype=np.uint32)
+        handles = (ids & NEW_VERTEX) != 0
+        ids[handles] = self.new_vertices[ids[handles] & ~np.uint32(NEW_VERTEX)]
+        return ids
+
+
+def refusal_from_proto(item: edits_pb2.SkippedItem) -> Refusal:
+    """Why an item was passed over."""
+    return Refusal(item.index, item.error.reason, item.error.message, dict(item.error.metadata))
+
+
+def lineage_from_proto(result: edits_pb2.EditResult) -> Lineage:
+    """What an edit made of what."""
+    kinds = from_bytes(result.element_kinds, "u1")
+    return Lineage(kinds - 1, from_bytes(result.element_ids, "<u4"), from_bytes(result.parent_ids, "<u4"))
