@@ -25,7 +25,7 @@ class PatchChecker {
   PatchChecker(const Mesh& mesh, const Patch& patch, const PatchLimits& limits)
       : mesh_(mesh), patch_(patch), limits_(limits) {}
 
-  absl::Status CheckAdded() const {
+  absl::Status CheckAdded() {
     for (size_t i = 0; i < patch_.added.size(); ++i) {
       const NewElement& element = patch_.added[i];
       DYNMESH_RETURN_IF_ERROR(
@@ -34,7 +34,7 @@ class PatchChecker {
     return absl::OkStatus();
   }
 
-  absl::Status CheckMoved() const {
+  absl::Status CheckMoved() {
     std::vector<EntityId> removed;
     if (!patch_.moves.empty()) removed = patch_.removed;
     std::sort(removed.begin(), removed.end());
@@ -63,8 +63,8 @@ class PatchChecker {
     return shape;
   }
 
-  absl::Status Check(EntityId parent, const Shape& child) const {
-    if (limits_.keep_orientation && Turns(Before(parent), child)) {
+  absl::Status Check(EntityId parent, const Shape& child) {
+    if (limits_.keep_orientation && Turns(parent, child)) {
       return Refuse(
           reason::kWouldInvert,
           absl::StrCat("the ", ElementTypeName(child.type), " in place of ", EntityKindName(parent.kind), " ",
@@ -81,16 +81,16 @@ class PatchChecker {
     return absl::OkStatus();
   }
 
-  bool Turns(const Shape& parent, const Shape& child) const {
+  bool Turns(EntityId parent, const Shape& child) {
     switch (KindOf(child.type)) {
       case EntityKind::kCell: {
-        const int before =
-            patch_.orientation != 0 ? patch_.orientation : Orientation(parent.type, parent.span());
+        const int before = patch_.orientation != 0 ? patch_.orientation : OrientationBefore(parent);
         return before != 0 && Orientation(child.type, child.span()) != before;
       }
       case EntityKind::kFace: {
-        if (IsFlatFace(parent.type, parent.span())) return false;
-        const Point before = AreaVector(parent.type, parent.span());
+        const Shape face = Before(parent);
+        if (IsFlatFace(face.type, face.span())) return false;
+        const Point before = AreaVector(face.type, face.span());
         return IsFlatFace(child.type, child.span()) ||
                !(Dot(before, AreaVector(child.type, child.span())) > 0);
       }
@@ -99,15 +99,27 @@ class PatchChecker {
     }
   }
 
+  /// Children of one parent follow each other.
+  int OrientationBefore(EntityId parent) {
+    if (parent != last_parent_) {
+      const Shape shape = Before(parent);
+      last_parent_ = parent;
+      last_orientation_ = Orientation(shape.type, shape.span());
+    }
+    return last_orientation_;
+  }
+
   const Mesh& mesh_;
   const Patch& patch_;
   const PatchLimits& limits_;
+  EntityId last_parent_;
+  int last_orientation_ = 0;
 };
 
 }  // namespace
 
 absl::Status CheckPatch(const Mesh& mesh, const Patch& patch, const PatchLimits& limits) {
-  const PatchChecker checker(mesh, patch, limits);
+  PatchChecker checker(mesh, patch, limits);
   DYNMESH_RETURN_IF_ERROR(checker.CheckAdded());
   return checker.CheckMoved();
 }

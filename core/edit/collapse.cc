@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 
+#include "absl/container/inlined_vector.h"
 #include "absl/strings/str_cat.h"
 #include "core/edit/cone.h"
 #include "core/edit/star.h"
@@ -19,11 +20,41 @@ struct Polygon {
   absl::Span<const VertexId> span() const { return absl::MakeConstSpan(vertices.data(), size); }
 };
 
+/// Edges from one vertex, for many look-ups.
+class EdgesFrom {
+ public:
+  EdgesFrom(const Mesh& mesh, VertexId v) : mesh_(mesh), v_(v) {
+    const auto edges = mesh.IncidentEdges(v);
+    if (edges.size() > kMaxListed) return;
+    for (EdgeId e : edges) {
+      if (mesh.IsDuplicate(e)) continue;
+      const auto ends = mesh.Vertices(e);
+      others_.push_back(ends[0] == v ? ends[1] : ends[0]);
+      edges_.push_back(e);
+    }
+  }
+
+  /// As Mesh::FindEdge.
+  EdgeId To(VertexId other) const {
+    if (others_.empty()) return mesh_.FindEdge(v_, other);
+    const size_t i = std::find(others_.begin(), others_.end(), other) - others_.begin();
+    return i < edges_.size() ? edges_[i] : EdgeId();
+  }
+
+ private:
+  static constexpr size_t kMaxListed = 64;  ///< the mesh has a better way to find one among very many
+
+  const Mesh& mesh_;
+  const VertexId v_;
+  absl::InlinedVector<VertexId, 32> others_;
+  absl::InlinedVector<EdgeId, 32> edges_;
+};
+
 /// What the collapse of one edge ties together, and whether anything else would merge.
 class LinkCondition {
  public:
   LinkCondition(const Mesh& mesh, VertexId kept, VertexId gone, uint64_t& work)
-      : mesh_(mesh), kept_(kept), gone_(gone), work_(work) {}
+      : mesh_(mesh), kept_(kept), gone_(gone), edges_of_kept_(mesh, kept), work_(work) {}
 
   absl::Status Check(EdgeId e) const {
     if (mesh_.IsOnBoundary(kept_) && mesh_.IsOnBoundary(gone_) && !mesh_.IsOnBoundary(e)) {
@@ -33,7 +64,9 @@ class LinkCondition {
     }
     for (EdgeId other : mesh_.IncidentEdges(gone_)) {
       DYNMESH_RETURN_IF_ERROR(CheckEdge(other));
-      for (FaceId f : mesh_.IncidentFaces(other)) DYNMESH_RETURN_IF_ERROR(CheckFace(f));
+      for (FaceId f : mesh_.IncidentFaces(other)) {
+        if (IsLowerEdge(mesh_, f, gone_, other)) DYNMESH_RETURN_IF_ERROR(CheckFace(f));
+      }
     }
     return absl::OkStatus();
   }
@@ -49,7 +82,7 @@ class LinkCondition {
     const VertexId c = OtherEnd(of_gone);
     if (c == kept_) return absl::OkStatus();
     work_ += WorkOfLookUp();
-    const EdgeId of_kept = mesh_.FindEdge(kept_, c);
+    const EdgeId of_kept = edges_of_kept_.To(c);
     if (!of_kept.valid()) return absl::OkStatus();
     const FaceId between = mesh_.FindFace({kept_, gone_, c});
     const auto refuse = [&](absl::string_view why) {
@@ -72,6 +105,7 @@ class LinkCondition {
   absl::Status CheckFace(FaceId of_gone) const {
     const auto vertices = mesh_.Vertices(of_gone);
     if (Contains(vertices, kept_)) return CheckShrinking(of_gone);
+    if (!AreNeighborsJoined(vertices)) return absl::OkStatus();
     std::array<VertexId, kMaxFaceVertices> moved;
     std::replace_copy(vertices.begin(), vertices.end(), moved.begin(), gone_, kept_);
     const FaceId of_kept = Find(absl::MakeConstSpan(moved.data(), vertices.size()));
@@ -81,6 +115,14 @@ class LinkCondition {
       if (HasFace(c, of_kept)) return CheckDangling(of_kept, of_gone);
     }
     return RefuseMerger(of_gone, of_kept);
+  }
+
+  /// Whether the vertices beside `gone` in a face are adjacent to `kept`.
+  bool AreNeighborsJoined(absl::Span<const VertexId> cycle) const {
+    work_ += 2 * WorkOfLookUp();
+    const size_t at = std::find(cycle.begin(), cycle.end(), gone_) - cycle.begin(), n = cycle.size();
+    return edges_of_kept_.To(cycle[(at + 1) % n]).valid() &&
+           edges_of_kept_.To(cycle[(at + n - 1) % n]).valid();
   }
 
   /// A quad of both becomes a triangle, which must not be there, with either end.
@@ -127,6 +169,7 @@ class LinkCondition {
 
   const Mesh& mesh_;
   const VertexId kept_, gone_;
+  const EdgesFrom edges_of_kept_;
   uint64_t& work_;
 };
 
@@ -160,12 +203,20 @@ class TwinCheck {
       const bool is_new =
           std::any_of(span.begin(), span.end(), [](VertexId v) { return v.slot() & kNewVertex; });
       if (is_new || Contains(span, kept_)) continue;
-      const FaceId f = mesh_.FindFace(span);
+      const FaceId f = FaceOf(parent, span);
       if (!f.valid()) return CellId();
       work += mesh_.IncidentCells(f).size();
       return TwinAt(f, element, parent);
     }
     return CellId();
+  }
+
+  /// The face with these vertices, which most likely is one of the parent's.
+  FaceId FaceOf(CellId parent, absl::Span<const VertexId> vertices) const {
+    for (OrientedFace oriented : mesh_.Faces(parent)) {
+      if (MatchFace(mesh_.Vertices(oriented.face()), vertices)) return oriented.face();
+    }
+    return mesh_.FindFace(vertices);
   }
 
   /// Duplicates that were there before stay what they are.

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "absl/types/optional.h"
 #include "core/mesh/vector.h"
 
 namespace dynmesh {
@@ -125,6 +126,20 @@ double WorstCorner(ElementType type, absl::Span<const Point> p) {
   return std::min(1.0, worst / RegularCorner(type));
 }
 
+/// All corners of a tetrahedron have the same volume, so no root need be drawn; nullopt where squares of
+/// lengths would leave the range of numbers.
+absl::optional<int> OrientationOfTetrahedron(absl::Span<const Point> p) {
+  constexpr double kSmallest = 1e-280, kLargest = 1e280;
+  const auto square = [&](int i, int j) { return Dot(p[j] - p[i], p[j] - p[i]); };
+  const double s01 = square(0, 1), s02 = square(0, 2), s03 = square(0, 3);
+  const double s12 = square(1, 2), s13 = square(1, 3), s23 = square(2, 3);
+  const double longest = std::max({s01 * s02 * s03, s01 * s12 * s13, s02 * s12 * s23, s03 * s13 * s23});
+  if (!(longest > kSmallest && longest < kLargest)) return absl::nullopt;
+  const double volume = SixVolumes(p[0], p[1], p[2], p[3]);
+  if (volume * volume <= kFlat * kFlat * longest) return 0;
+  return volume > 0 ? 1 : -1;
+}
+
 }  // namespace
 
 Point AreaVector(ElementType type, absl::Span<const Point> p) {
@@ -147,6 +162,9 @@ double Measure(ElementType type, absl::Span<const Point> p) {
 
 int Orientation(ElementType type, absl::Span<const Point> p) {
   if (KindOf(type) != EntityKind::kCell) return 0;
+  if (type == ElementType::kTetrahedron) {
+    if (const auto orientation = OrientationOfTetrahedron(p)) return *orientation;
+  }
   bool positive = true, negative = true;
   for (const Corner& corner : CornersOf(type)) {
     const double jacobian = ScaledJacobian(corner, p);

@@ -8,8 +8,9 @@
 namespace dynmesh {
 namespace {
 
-template <typename Id>
-void SortUnique(std::vector<Id>& ids) {
+template <typename Ids>
+void SortUnique(Ids& ids) {
+  if (ids.size() < 2) return;
   std::sort(ids.begin(), ids.end());
   ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
 }
@@ -25,6 +26,33 @@ void Gather(const Mesh& mesh, EdgeId e, Star& star) {
   }
 }
 
+/// Whether `f` is the first face of a cell that has `v`.
+bool IsFirstFace(const Mesh& mesh, CellId c, VertexId v, FaceId f) {
+  for (OrientedFace oriented : mesh.Faces(c)) {
+    if (oriented.face() == f) return true;
+    if (Contains(mesh.Vertices(oriented.face()), v)) return false;
+  }
+  return false;
+}
+
+/// Gather at a vertex where no element is degenerate: looks at each face once, and takes each cell once.
+void GatherPlain(const Mesh& mesh, VertexId v, Star& star) {
+  for (EdgeId e : mesh.IncidentEdges(v)) {
+    ++star.work;
+    if (mesh.IsElement(e)) star.wires.push_back(e);
+    for (FaceId f : mesh.IncidentFaces(e)) {
+      ++star.work;
+      if (!IsLowerEdge(mesh, f, v, e)) continue;
+      if (mesh.IsElement(f)) star.faces.push_back(f);
+      const auto cells = mesh.IncidentCells(f);
+      star.work += cells.size();
+      for (CellId c : cells) {
+        if (IsFirstFace(mesh, c, v, f)) star.cells.push_back(c);
+      }
+    }
+  }
+}
+
 void MakeUnique(Star& star) {
   SortUnique(star.cells);
   SortUnique(star.faces);
@@ -33,8 +61,20 @@ void MakeUnique(Star& star) {
 
 }  // namespace
 
+bool IsLowerEdge(const Mesh& mesh, FaceId f, VertexId v, EdgeId e) {
+  const auto vertices = mesh.Vertices(f);
+  const auto edges = mesh.Edges(f);
+  const size_t next = std::find(vertices.begin(), vertices.end(), v) - vertices.begin();
+  return e == std::min(edges[next], edges[next == 0 ? edges.size() - 1 : next - 1]);
+}
+
 Star StarOf(const Mesh& mesh, EdgeId e) {
   Star star;
+  if (!mesh.HasDuplicates(EntityKind::kEdge)) {
+    Gather(mesh, e, star);
+    MakeUnique(star);
+    return star;
+  }
   const auto ends = mesh.Vertices(e);
   const auto fewer = std::min(mesh.IncidentEdges(ends[0]), mesh.IncidentEdges(ends[1]),
                               [](const auto& a, const auto& b) { return a.size() < b.size(); });
@@ -49,7 +89,11 @@ Star StarOf(const Mesh& mesh, EdgeId e) {
 
 Star StarOf(const Mesh& mesh, VertexId v) {
   Star star;
-  for (EdgeId e : mesh.IncidentEdges(v)) Gather(mesh, e, star);
+  if (mesh.IsPlain()) {
+    GatherPlain(mesh, v, star);
+  } else {
+    for (EdgeId e : mesh.IncidentEdges(v)) Gather(mesh, e, star);
+  }
   MakeUnique(star);
   return star;
 }
@@ -72,6 +116,7 @@ uint64_t WorkOfStar(const Mesh& mesh, VertexId v) {
 
 absl::Status CheckNotDegenerate(const Mesh& mesh, const Star& star) {
   absl::Status status;
+  if (mesh.IsPlain()) return status;
   ForEachElement(star, [&](EntityId id) {
     if (!mesh.IsDegenerate(id) || !status.ok()) return;
     status = Refuse(reason::kDegenerateElement,
@@ -79,10 +124,6 @@ absl::Status CheckNotDegenerate(const Mesh& mesh, const Star& star) {
                     {id.slot});
   });
   return status;
-}
-
-bool Contains(absl::Span<const VertexId> vertices, VertexId v) {
-  return std::find(vertices.begin(), vertices.end(), v) != vertices.end();
 }
 
 std::array<VertexId, 2> EndsFrom(const Mesh& mesh, EdgeId e, VertexId origin) {

@@ -2,8 +2,8 @@
 #define DYNMESH_CORE_EDIT_STAR_H_
 
 #include <array>
-#include <vector>
 
+#include "absl/container/inlined_vector.h"
 #include "absl/status/status.h"
 #include "absl/types/span.h"
 #include "core/mesh/mesh.h"
@@ -12,10 +12,10 @@ namespace dynmesh {
 
 /// The elements that have an edge or a vertex: ascending, each once.
 struct Star {
-  std::vector<CellId> cells;
-  std::vector<FaceId> faces;  ///< that are elements
-  std::vector<EdgeId> wires;  ///< edges that are elements
-  uint64_t work = 0;          ///< entities looked at to find them
+  absl::InlinedVector<CellId, 32> cells;
+  absl::InlinedVector<FaceId, 8> faces;  ///< that are elements
+  absl::InlinedVector<EdgeId, 4> wires;  ///< edges that are elements
+  uint64_t work = 0;                     ///< entities looked at to find them
 };
 
 /// Duplicates at the same two vertices are of the star too. Cost: linear in the star, and sorting it.
@@ -39,7 +39,16 @@ bool HasElementAt(const Mesh& mesh, FaceId f);
 /// What StarOf(mesh, v) would look at. Cost: the faces at the vertex.
 uint64_t WorkOfStar(const Mesh& mesh, VertexId v);
 
-bool Contains(absl::Span<const VertexId> vertices, VertexId v);
+inline bool Contains(absl::Span<const VertexId> vertices, VertexId v) {
+  for (VertexId other : vertices) {
+    if (other == v) return true;
+  }
+  return false;
+}
+
+/// Whether `e` is the lower one of the two edges that a face, not degenerate, has at `v`: by which faces at a
+/// vertex are seen once and not twice.
+bool IsLowerEdge(const Mesh& mesh, FaceId f, VertexId v, EdgeId e);
 
 /// The ends of an edge from `origin` on, or as they are stored where that is invalid.
 std::array<VertexId, 2> EndsFrom(const Mesh& mesh, EdgeId e, VertexId origin);

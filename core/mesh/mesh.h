@@ -141,6 +141,8 @@ class Mesh {
   }
   /// Whether no element is degenerate.
   bool IsPlain() const { return num_degenerate_ == 0; }
+  /// Whether any edge or face IsDuplicate.
+  bool HasDuplicates(EntityKind kind) const { return !duplicates_[Dimension(kind)].empty(); }
 
   absl::Span<const VertexId> Vertices(EdgeId e) const { return edge_vertices_[e.slot()]; }
   absl::Span<const VertexId> Vertices(FaceId f) const {
@@ -197,6 +199,14 @@ class Mesh {
   size_t FaceStride() const { return face_stride_; }
   /// Whether no cell of another type was ever there.
   bool IsTetrahedral() const { return cell_vertex_stride_ == NumVertices(ElementType::kTetrahedron); }
+
+  /// Asks memory for what an operator at an edge will read: its star and what is incident to that. Each stage
+  /// needs what the one before asked for, so they are to be called in turn, other edges in between. Any slot
+  /// may be named, also of none. Changes nothing but time.
+  static constexpr int kPrefetchStages = 7;
+  void PrefetchStar(EdgeId e, int stage) const;
+  void PrefetchStar(FaceId f, int stage) const;
+  void PrefetchStar(VertexId v, int stage) const;
 
   // ---- Boundary: known at any moment, listed without a traversal ----
 
@@ -308,8 +318,9 @@ class Mesh {
     FaceId face;
     FaceCode code;
   };
-  /// What AddCell knows of a cell's edges and faces while it gathers them.
-  struct CellParts;
+  using FaceEdges = std::array<EdgeId, kMaxFaceVertices>;
+  struct CellParts;  // cell_parts.h
+  class Nearby;      // nearby.h
   /// Of the edges that ElementTemplate::smart_edges names those that were found already; others are invalid.
   using SmartEdges = std::array<EdgeId, 3>;
 
@@ -325,12 +336,15 @@ class Mesh {
   // mesh_edits.cc: checks, and the hierarchical creation behind the public edits
   absl::Status CheckVertices(ElementType type, VertexSpan vertices) const;
   absl::Status CheckRoom(ElementType type) const;
+  absl::Status CheckRoom(const std::array<uint32_t, kNumEntityKinds>& needed) const;
   absl::Status CheckRemovable(EntityId id) const;
   /// What AddElement does after CheckVertices; the boundary of a cell is left to be settled.
   absl::StatusOr<EntityId> AddChecked(ElementType type, VertexSpan vertices, const SmartEdges& known);
   absl::StatusOr<EntityId> AddWireEdge(VertexSpan vertices);
   absl::StatusOr<EntityId> AddFaceElement(VertexSpan vertices);
+  absl::StatusOr<EntityId> AddFaceElement(VertexSpan vertices, FaceEdges& edges, const FaceMatch& match);
   absl::StatusOr<EntityId> AddCell(ElementType type, VertexSpan vertices, const SmartEdges& known);
+  absl::StatusOr<EntityId> AddCell(ElementType type, VertexSpan vertices, CellParts& parts);
   absl::Status RefuseDuplicate(EntityId existing) const;
   CellId FindCell(ElementType type, const CellParts& parts) const;
   CellId FindCellButNot(CellId c, ElementType type, const CellParts& parts) const;
@@ -343,6 +357,18 @@ class Mesh {
                          CellParts& parts) const;
   EdgeId EnsureEdge(VertexId a, VertexId b);
   void EnsureCellParts(const ElementTemplate& shape, VertexSpan vertices, CellParts& parts);
+
+  // mesh_prefetch.cc
+  void PrefetchVertex(VertexId v, int step) const;
+  void PrefetchEdge(EdgeId e, int step) const;
+  void PrefetchFace(FaceId f) const;
+  void PrefetchCell(CellId c) const;
+  void PrefetchEdges(FaceId f, int step) const;
+
+  // mesh_replace.cc
+  absl::StatusOr<EntityId> AddNear(const NewElement& element, Nearby& nearby);
+  absl::StatusOr<EntityId> AddFaceNear(VertexSpan vertices, Nearby& nearby);
+  absl::StatusOr<EntityId> AddCellNear(ElementType type, VertexSpan vertices, Nearby& nearby);
 
   // mesh_batches.cc
   std::vector<uint32_t> OrderOfElements(absl::Span<const VertexId> vertices, size_t size) const;
@@ -375,6 +401,8 @@ class Mesh {
   void IndexHubFace(FaceId f);
   void ForgetHubFace(FaceId f);
   bool IsLastBetweenEnds(EdgeId e) const;
+  /// Vertices and edges of solids have more neighbours than those of surfaces.
+  bool IsSolid() const { return NumLive(EntityKind::kCell) > 0; }
   void LinkEdge(EdgeId e);
   void UnlinkEdge(EdgeId e);
   void LinkFace(FaceId f);

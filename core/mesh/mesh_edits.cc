@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "absl/strings/str_cat.h"
+#include "core/mesh/cell_parts.h"
 #include "core/mesh/mesh.h"
 
 namespace dynmesh {
@@ -17,11 +18,6 @@ Slot XorOf(const VertexId* vertices, size_t size) {
 }
 
 }  // namespace
-
-struct Mesh::CellParts {
-  std::array<EdgeId, kMaxElementEdges> edges;
-  std::array<FaceMatch, kMaxElementFaces> faces;
-};
 
 // ---- Checks ----
 
@@ -54,22 +50,27 @@ absl::Status Mesh::CheckVertices(ElementType type, VertexSpan vertices) const {
                            absl::StrCat("a ", ElementTypeName(type), " has ", NumVertices(type),
                                         " vertices, not ", vertices.size()));
   }
-  for (VertexId v : vertices) DYNMESH_RETURN_IF_ERROR(CheckLive(v));
+  for (VertexId v : vertices) {
+    if (!IsLive(v)) return CheckLive(v);
+  }
   return absl::OkStatus();
 }
 
 absl::Status Mesh::CheckRoom(ElementType type) const {
-  constexpr absl::string_view kLimitNames[] = {"max_vertices", "max_edges", "max_faces", "max_cells"};
   const ElementTemplate& shape = TemplateOf(type);
-  const uint32_t needed[] = {0, shape.num_edges, shape.num_faces, shape.kind == EntityKind::kCell};
+  return CheckRoom({0, shape.num_edges, shape.num_faces, shape.kind == EntityKind::kCell});
+}
+
+absl::Status Mesh::CheckRoom(const std::array<uint32_t, kNumEntityKinds>& needed) const {
+  constexpr absl::string_view kLimitNames[] = {"max_vertices", "max_edges", "max_faces", "max_cells"};
   for (int kind = 1; kind < kNumEntityKinds; ++kind) {
     const uint32_t limit = options_.limits.max_slots[kind];
     if (!slots_[kind].CanAllocate(needed[kind], limit)) {
       return LimitExceeded(kLimitNames[kind], limit, uint64_t{slots_[kind].num_live()} + needed[kind]);
     }
   }
-  if (!vertex_edges_.HasRoom(kMaxElementEdges) || !edge_faces_.HasRoom(kMaxElementEdges) ||
-      !face_overflow_.HasRoom(kMaxElementFaces) ||
+  if (!vertex_edges_.HasRoom(2 * needed[1]) || !edge_faces_.HasRoom(kMaxFaceVertices * needed[2]) ||
+      !face_overflow_.HasRoom(kMaxElementFaces * needed[3]) ||
       !stored_.HasRoom(kMaxElementFaces * 2 * StoredRows::kMaxRow)) {
     return LimitExceeded("max_incident_entities", IncidenceLists<EdgeId>::kMaxLength,
                          uint64_t{IncidenceLists<EdgeId>::kMaxLength} + 1);
@@ -234,11 +235,16 @@ absl::StatusOr<EntityId> Mesh::AddWireEdge(VertexSpan vertices) {
 
 absl::StatusOr<EntityId> Mesh::AddFaceElement(VertexSpan vertices) {
   const size_t n = vertices.size();
-  std::array<EdgeId, kMaxFaceVertices> edges;
+  FaceEdges edges;
   for (size_t k = 0; k < n; ++k) edges[k] = FindEdge(vertices[k], vertices[(k + 1) % n]);
   const auto edge_span = absl::MakeConstSpan(edges.data(), n);
   const bool all_exist = std::all_of(edge_span.begin(), edge_span.end(), [](EdgeId e) { return e.valid(); });
   const FaceMatch match = all_exist ? FindFaceAround(LeastUsed(edge_span), vertices) : FaceMatch();
+  return AddFaceElement(vertices, edges, match);
+}
+
+absl::StatusOr<EntityId> Mesh::AddFaceElement(VertexSpan vertices, FaceEdges& edges, const FaceMatch& match) {
+  const size_t n = vertices.size();
   const bool cheap =
       match.code.value == 0 || (match.face.valid() && NumFaceCells(match.face) <= kMaxReorderedCells);
   if (match.face.valid() && !IsElement(match.face) && cheap) {
@@ -252,13 +258,18 @@ absl::StatusOr<EntityId> Mesh::AddFaceElement(VertexSpan vertices) {
     if (!edges[k].valid()) edges[k] = EnsureEdge(vertices[k], vertices[(k + 1) % n]);
   }
   WidenFaces(n);
-  return CreateFace(vertices, edge_span, kElementFlag | (match.face.valid() ? kDuplicateFlag : 0));
+  return CreateFace(vertices, absl::MakeConstSpan(edges.data(), n),
+                    kElementFlag | (match.face.valid() ? kDuplicateFlag : 0));
 }
 
 absl::StatusOr<EntityId> Mesh::AddCell(ElementType type, VertexSpan vertices, const SmartEdges& known) {
-  const ElementTemplate& shape = TemplateOf(type);
   CellParts parts;
-  FindCellParts(shape, vertices, known, parts);
+  FindCellParts(TemplateOf(type), vertices, known, parts);
+  return AddCell(type, vertices, parts);
+}
+
+absl::StatusOr<EntityId> Mesh::AddCell(ElementType type, VertexSpan vertices, CellParts& parts) {
+  const ElementTemplate& shape = TemplateOf(type);
   if (options_.duplicates == DuplicatePolicy::kRefuse) {
     if (const CellId twin = FindCell(type, parts); twin.valid()) return RefuseDuplicate(twin);
   }

@@ -25,8 +25,14 @@ FaceId Mesh::CreateFace(VertexSpan vertices, absl::Span<const EdgeId> edges, uin
   JournalEntry entry;
   const FaceId f(NewSlot(EntityKind::kFace, entry));
   const size_t row = size_t{f.slot()} * face_stride_;
-  std::copy(vertices.begin(), vertices.end(), face_vertices_.begin() + row);
-  std::copy(edges.begin(), edges.end(), face_edges_.begin() + row);
+  for (size_t k = 0; k < 3; ++k) {  // known to the compiler, which else calls memmove
+    face_vertices_[row + k] = vertices[k];
+    face_edges_[row + k] = edges[k];
+  }
+  if (vertices.size() == 4) {
+    face_vertices_[row + 3] = vertices[3];
+    face_edges_[row + 3] = edges[3];
+  }
   const ElementType type = vertices.size() == 4 ? ElementType::kQuad : ElementType::kTriangle;
   flags(f) = static_cast<uint8_t>(type) | extra_flags | (HasRepeats(vertices) ? kDegenerateFlag : 0);
   if (IsDuplicate(f)) CountDuplicate(f, +1);
@@ -94,7 +100,7 @@ bool Mesh::IsUnneeded(FaceId f) const { return IsLive(f) && !IsElement(f) && Num
 
 void Mesh::LinkEdge(EdgeId e) {
   for (VertexId v : Vertices(e)) {
-    vertex_edges_.Add(v.slot(), e);
+    vertex_edges_.Add(v.slot(), e, IsSolid() ? 8 : 6);
     if (vertex_edges_.Length(v.slot()) == kHubDegree + 1) IndexHubEdges(v);
   }
   IndexHubEdge(e);
@@ -215,8 +221,7 @@ void Mesh::RemoveFaceCell(FaceId f, CellId c) {
 
 void Mesh::AddEdgeFace(EdgeId e, FaceId f) {
   const uint32_t before = edge_faces_.Length(e.slot());
-  edge_faces_.Add(e.slot(), f,
-                  NumLive(EntityKind::kCell) > 0 ? 4 : 2);  // solids: most edges have four and more
+  edge_faces_.Add(e.slot(), f, IsSolid() ? 6 : 2);
   if (before < 2) CountBoundary(e, before == 0 ? +1 : -1);
 }
 

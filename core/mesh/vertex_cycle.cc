@@ -4,9 +4,8 @@
 
 namespace dynmesh {
 
-absl::optional<FaceCode> MatchFace(absl::Span<const VertexId> stored, absl::Span<const VertexId> key) {
+absl::optional<FaceCode> MatchCycle(absl::Span<const VertexId> stored, absl::Span<const VertexId> key) {
   const int n = stored.size();
-  if (key.size() != stored.size()) return absl::nullopt;
   for (const int flipped : {0, 4}) {
     const int second = flipped ? n - 1 : 1;  // step from one vertex of the key to the next
     for (int rotation = 0; rotation < n; ++rotation) {

@@ -51,8 +51,27 @@ inline bool HasRepeats(absl::Span<const VertexId> vertices) {
   return false;
 }
 
+/// MatchFace for cycles of any length.
+absl::optional<FaceCode> MatchCycle(absl::Span<const VertexId> stored, absl::Span<const VertexId> key);
+
+/// The same for triangles, which most faces are.
+inline absl::optional<FaceCode> MatchTriangle(const VertexId* stored, const VertexId* key) {
+  constexpr uint8_t kFlipped = 4;
+  for (uint8_t rotation = 0; rotation < 3; ++rotation) {
+    const int next = rotation == 2 ? 0 : rotation + 1, last = rotation == 0 ? 2 : rotation - 1;
+    if (stored[rotation] != key[0]) continue;
+    if (stored[next] == key[1] && stored[last] == key[2]) return FaceCode{rotation};
+    if (stored[last] == key[1] && stored[next] == key[2])
+      return FaceCode{static_cast<uint8_t>(rotation | kFlipped)};
+  }
+  return absl::nullopt;
+}
+
 /// How `stored` lies against `key`, or nullopt if they are not the same cycle.
-absl::optional<FaceCode> MatchFace(absl::Span<const VertexId> stored, absl::Span<const VertexId> key);
+inline absl::optional<FaceCode> MatchFace(absl::Span<const VertexId> stored, absl::Span<const VertexId> key) {
+  if (stored.size() != key.size()) return absl::nullopt;
+  return stored.size() == 3 ? MatchTriangle(stored.data(), key.data()) : MatchCycle(stored, key);
+}
 
 /// A cycle of up to four vertices in a form that is the same for every rotation and reflection: the smallest
 /// of them, padded with invalid ids. Of an edge: its ends, sorted.
