@@ -245,11 +245,13 @@ TEST(LimitsTest, ALongerPayloadThanAllowedIsRefusedByName) {
 }
 
 TEST(VersionTest, ANewerVersionIsToldFromDamage) {
-  std::string bytes = Encode({}, Codec::kRaw);
-  bytes[4] = 2;
-  for (const absl::Status& status : {DecodeDelta(bytes).status(), PeekDelta(bytes).status()}) {
-    EXPECT_EQ(status.code(), absl::StatusCode::kUnimplemented);
-    EXPECT_EQ(ErrorReason(status), reason::kUnsupportedFormat);
+  for (int version : {0, 3, 255}) {
+    std::string bytes = Encode({}, Codec::kRaw);
+    bytes[4] = static_cast<char>(version);
+    for (const absl::Status& status : {DecodeDelta(bytes).status(), PeekDelta(bytes).status()}) {
+      EXPECT_EQ(status.code(), absl::StatusCode::kUnimplemented);
+      EXPECT_EQ(ErrorReason(status), reason::kUnsupportedFormat);
+    }
   }
 }
 
