@@ -33,7 +33,8 @@ absl::StatusOr<std::vector<Slot>> UnpackSlots(const Section& section);
 /// The bijection of signed on unsigned integers that keeps small ones small: 0, -1, 1, -2, ...
 template <typename Unsigned>
 constexpr Unsigned ZigZag(Unsigned difference) {
-  return static_cast<Unsigned>((difference << 1) ^ (Unsigned{0} - (difference >> (8 * sizeof(Unsigned) - 1))));
+  return static_cast<Unsigned>((difference << 1) ^
+                               (Unsigned{0} - (difference >> (8 * sizeof(Unsigned) - 1))));
 }
 template <typename Unsigned>
 constexpr Unsigned UnZigZag(Unsigned symbol) {

@@ -16,9 +16,9 @@ struct AppliedPatch {
   uint64_t attribute_bytes = 0;  ///< that attributes of new and kept entities took
 };
 
-/// Carries out a patch. Faces and edges that old and new elements share live on. Attributes follow the policies
-/// of their columns (mix_rows.h): new elements take those of the element whose place they take, new vertices those
-/// of their blend, kept vertices those of both; for edges and faces see derived_rows.h.
+/// Carries out a patch. Faces and edges that old and new elements share live on. Attributes follow the
+/// policies of their columns (mix_rows.h): new elements take those of the element whose place they take, new
+/// vertices those of their blend, kept vertices those of both; for edges and faces see derived_rows.h.
 ///
 /// Errors: those of Mesh's edits; FAILED_PRECONDITION WOULD_CHANGE_TOPOLOGY when the Euler characteristic
 /// (vertices - edges + faces - cells) would change and Patch::check_euler is set. Nothing has changed then.

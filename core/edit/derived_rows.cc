@@ -32,8 +32,9 @@ void DerivedRows::Keep(const Patch::Cut& cut, VertexId middle) {
   }
   if (face_columns_.empty()) return;
   for (FaceId f : mesh_.IncidentFaces(e)) {
-    ForEachOtherSide(mesh_.Vertices(f), cut.a, cut.b,
-                     [&](VertexId from, VertexId to) { Keep(f, {{from, to, middle}, 3}); });
+    ForEachOtherSide(mesh_.Vertices(f), cut.a, cut.b, [&](VertexId from, VertexId to) {
+      Keep(f, {{from, to, middle}, 3});
+    });
   }
 }
 

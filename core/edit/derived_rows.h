@@ -14,11 +14,12 @@
 
 namespace dynmesh {
 
-/// Attributes of the edges and faces at a patch's cuts and mergers, which end with the elements that need them,
-/// for those that follow from them:
+/// Attributes of the edges and faces at a patch's cuts and mergers, which end with the elements that need
+/// them, for those that follow from them:
 ///
 ///     cut a-b at m          the halves of the edge take its row, the parts of a face at it that face's
-///     `gone` becomes `kept` an edge or face of `gone` passes its row on to the one with `kept`; where that was
+///     `gone` becomes `kept` an edge or face of `gone` passes its row on to the one with `kept`; where that
+///     was
 ///                           there already, the policy chooses, and it has all the weight
 ///
 /// Nothing is looked for where the mesh has no column of edges or of faces.
@@ -28,7 +29,8 @@ class DerivedRows {
   /// REQUIRES: these are placed, and no element is replaced yet. Cost: linear in the stars, times look-ups.
   DerivedRows(const Mesh& mesh, const Patch& patch, absl::Span<const VertexId> new_vertices);
 
-  /// Passes it on to those that are there now. REQUIRES: the elements are replaced. Errors: those of RowWriter.
+  /// Passes it on to those that are there now. REQUIRES: the elements are replaced. Errors: those of
+  /// RowWriter.
   absl::Status PassOn(RowWriter& writer) const;
 
  private:

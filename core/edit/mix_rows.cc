@@ -41,7 +41,8 @@ Scalar Interpolate(Parents parents, size_t component) {
     for (const RowShare& parent : parents) sum += parent.weight * ScalarAt<Scalar>(parent.row, component);
     return static_cast<Scalar>(std::clamp<double>(sum, low, high));
   } else {
-    // Differences to the least, as unsigned numbers: those of equal parents are exactly 0, and none overflows.
+    // Differences to the least, as unsigned numbers: those of equal parents are exactly 0, and none
+    // overflows.
     const auto base = static_cast<uint64_t>(low);
     for (const RowShare& parent : parents) {
       sum += parent.weight *

@@ -51,8 +51,9 @@ struct Patch {
 
   std::vector<NewVertex> new_vertices;
   std::vector<Move> moves;
-  std::vector<Merger> mergers;  ///< attributes of vertices, and of the edges and faces there, follow from these
-  std::vector<Cut> cuts;        ///< and from these
+  std::vector<Merger>
+      mergers;            ///< attributes of vertices, and of the edges and faces there, follow from these
+  std::vector<Cut> cuts;  ///< and from these
   std::vector<EntityId> removed;
   std::vector<NewElement> added;
   std::vector<uint32_t> parents;  ///< of each added element: an index in `removed`

@@ -94,8 +94,8 @@ absl::Status CheckAttributeSpec(const AttributeSpec& spec) {
 absl::Status CheckFinite(const AttributeSpec& spec, absl::Span<const uint8_t> values) {
   if (!IsFloatingPoint(spec.type)) return absl::OkStatus();
   assert(values.size() % spec.row_bytes() == 0);
-  const size_t offset = spec.type == AttributeType::kFloat64 ? FindNonFinite<double>(values)
-                                                             : FindNonFinite<float>(values);
+  const size_t offset =
+      spec.type == AttributeType::kFloat64 ? FindNonFinite<double>(values) : FindNonFinite<float>(values);
   if (offset == values.size()) return absl::OkStatus();
   const std::string row = absl::StrCat(offset / spec.row_bytes());
   return InvalidArgument(reason::kNonFinite,

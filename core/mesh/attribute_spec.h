@@ -1,7 +1,6 @@
 #ifndef DYNMESH_CORE_MESH_ATTRIBUTE_SPEC_H_
 #define DYNMESH_CORE_MESH_ATTRIBUTE_SPEC_H_
 
-#include <cassert>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -23,8 +22,8 @@ enum class AttributeType : uint8_t {
   kUint8 = 5,
 };
 
-/// Which row an entity takes that an operator makes of others, its parents (core/edit/OPERATORS.md). The values
-/// travel on the wire: never renumber.
+/// Which row an entity takes that an operator makes of others, its parents (core/edit/OPERATORS.md). The
+/// values travel on the wire: never renumber.
 enum class AttributePolicy : uint8_t {
   kUnspecified = 0,  ///< kInterpolate for floating-point numbers, kCopy for integers
   kInterpolate = 1,  ///< vertices: weighed, integers to the nearest, a half upwards; others: kCopy

@@ -48,7 +48,8 @@ class AttributeColumn {
 
   AttributeSpec spec_;
   Stamp born_;
-  std::vector<std::vector<uint8_t>> pages_;  ///< rows of StampColumn::kPageSlots slots each; empty: all defaults
+  std::vector<std::vector<uint8_t>>
+      pages_;  ///< rows of StampColumn::kPageSlots slots each; empty: all defaults
   std::vector<uint8_t> default_row_;
   StampColumn stamps_;
 };

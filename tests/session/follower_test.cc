@@ -20,6 +20,7 @@ void ExpectEqual(RecordingSink& sink, Session& session) {
                       EXPECT_EQ(mirror.revision(), view.mesh.revision());
                       EXPECT_EQ(mirror.checksum(), view.mesh.checksum());
                       EXPECT_TRUE(ModelOf(mirror) == ModelOf(view.mesh));
+                      ExpectSameRows(mirror.attributes(), view.mesh);
                       return absl::OkStatus();
                     })
                     .ok());

@@ -71,7 +71,8 @@ TYPED_TEST(MixRowsTest, EachPolicyDoesWhatItSays) {
 
 TYPED_TEST(MixRowsTest, ExtremesStayWithinTheirParents) {
   using P = AttributePolicy;
-  const TypeParam high = std::numeric_limits<TypeParam>::max(), low = std::numeric_limits<TypeParam>::lowest();
+  const TypeParam high = std::numeric_limits<TypeParam>::max(),
+                  low = std::numeric_limits<TypeParam>::lowest();
   EXPECT_EQ(Mix<TypeParam>(P::kInterpolate, {{high, 0.1}, {high, 0.2}, {high, 0.7}}), high);
   EXPECT_EQ(Mix<TypeParam>(P::kInterpolate, {{low, 0.1}, {low, 0.2}, {low, 0.7}}), low);
   EXPECT_EQ(Mix<TypeParam>(P::kInterpolate, {{low, 1}, {high, 0}}), low);
@@ -87,8 +88,10 @@ TYPED_TEST(MixRowsTest, RandomRowsInterpolateBetweenTheirParents) {
     TypeParam values[3];
     const uint64_t bits[3] = {rng(), rng(), rng()};
     for (int i = 0; i < 3; ++i) std::memcpy(&values[i], &bits[i], sizeof(values[i]));
-    if (!std::all_of(values, values + 3, [](TypeParam v) { return std::isfinite(static_cast<double>(v)); })) continue;
-    const double a = std::uniform_real_distribution<>(0, 0.5)(rng), b = std::uniform_real_distribution<>(0, 0.5)(rng);
+    if (!std::all_of(values, values + 3, [](TypeParam v) { return std::isfinite(static_cast<double>(v)); }))
+      continue;
+    const double a = std::uniform_real_distribution<>(0, 0.5)(rng),
+                 b = std::uniform_real_distribution<>(0, 0.5)(rng);
     const TypeParam mixed = Mix<TypeParam>(AttributePolicy::kInterpolate,
                                            {{values[0], a}, {values[1], b}, {values[2], 1 - a - b}});
     EXPECT_GE(mixed, *std::min_element(values, values + 3)) << "round " << round;
@@ -102,7 +105,8 @@ TEST(ConvertRowsTest, ValuesStayExactlyWhatTheyAreOrAreRefused) {
   };
   using T = AttributeType;
   EXPECT_EQ(*convert(RowOf<int64_t>({-5, 7}), T::kInt64, T::kInt32), RowOf<int32_t>({-5, 7}));
-  EXPECT_EQ(*convert(RowOf<int64_t>({int64_t{1} << 53}), T::kInt64, T::kFloat64), RowOf<double>({9007199254740992.0}));
+  EXPECT_EQ(*convert(RowOf<int64_t>({int64_t{1} << 53}), T::kInt64, T::kFloat64),
+            RowOf<double>({9007199254740992.0}));
   EXPECT_EQ(*convert(RowOf<double>({0.5, -1e300}), T::kFloat64, T::kFloat64), RowOf<double>({0.5, -1e300}));
   EXPECT_EQ(*convert(RowOf<double>({0.5, 255}), T::kFloat64, T::kFloat32), RowOf<float>({0.5, 255}));
   EXPECT_EQ(*convert(RowOf<float>({3, 255}), T::kFloat32, T::kUint8), RowOf<uint8_t>({3, 255}));
@@ -127,11 +131,13 @@ constexpr AttributePolicy kPolicies[] = {AttributePolicy::kInterpolate, Attribut
                                          AttributePolicy::kMax, AttributePolicy::kDrop};
 const char* const kNames[] = {"interpolate", "copy", "max", "drop"};
 
-/// Columns of int32 of one kind, one for each policy, all rows -1 by default; the i-th live entity has 10 + i.
+/// Columns of int32 of one kind, one for each policy, all rows -1 by default; the i-th live entity has 10 +
+/// i.
 void AddColumns(Mesh& mesh, EntityKind kind) {
   for (int i = 0; i < 4; ++i) {
     ASSERT_TRUE(
-        mesh.AddAttribute({kNames[i], kind, AttributeType::kInt32, 1, kPolicies[i], RowOf<int32_t>({-1})}).ok());
+        mesh.AddAttribute({kNames[i], kind, AttributeType::kInt32, 1, kPolicies[i], RowOf<int32_t>({-1})})
+            .ok());
     const int column = mesh.FindAttribute(kNames[i], kind);
     int32_t value = 10;
     mesh.slots(kind).live().ForEach(
@@ -223,7 +229,8 @@ TEST(PolicyTest, HalvesOfAnEdgeAndPartsOfAFaceTakeTheirs) {
     for (FaceId f : mesh.IncidentFaces(cut)) {
       faces.push_back({{mesh.Vertices(f).begin(), mesh.Vertices(f).end()}, ValueAt(mesh, 0, f)});
     }
-    const BatchResult result = Apply(mesh, SplitEdgesEdit{{{cut.slot()}, {}}, {}, {}, {.keep_orientation = false}});
+    const BatchResult result =
+        Apply(mesh, SplitEdgesEdit{{{cut.slot()}, {}}, {}, {}, {.keep_orientation = false}});
     ASSERT_FALSE(result.results.empty());
     const VertexId m(result.results[0].new_slots[0]);
     for (VertexId end : {a, b}) {
@@ -265,10 +272,11 @@ TEST(PolicyTest, RefusedOperatorsLeaveRowsAlone) {
   Mesh mesh = Octahedron();
   for (EntityKind kind : {V, E, F}) AddColumns(mesh, kind);
   const std::string before = Describe(mesh);
-  const auto result = ApplyBatch(mesh,
-                                 {SplitEdgesEdit{{{0}, {}}, {}, {}, {}}, CollapseEdgesEdit{{{1}, {}}, {}, {}, {}},
-                                  SplitElementsEdit{F, {999}, {}, {}}},
-                                 {});
+  const auto result =
+      ApplyBatch(mesh,
+                 {SplitEdgesEdit{{{0}, {}}, {}, {}, {}}, CollapseEdgesEdit{{{1}, {}}, {}, {}, {}},
+                  SplitElementsEdit{F, {999}, {}, {}}},
+                 {});
   EXPECT_FALSE(result.ok());
   EXPECT_EQ(Describe(mesh), before);
 }

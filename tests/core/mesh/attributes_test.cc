@@ -52,7 +52,8 @@ TEST(AttributeSpecTest, EachFieldThatIsWrongIsNamed) {
   EXPECT_EQ(RefusalAfter([](auto& s) { s.name = "a b"; }), Refusal(bad, "name"));
   EXPECT_EQ(RefusalAfter([](auto& s) { s.kind = static_cast<EntityKind>(4); }), Refusal(bad, "kind"));
   for (int type : {0, 6, 255}) {
-    EXPECT_EQ(RefusalAfter([=](auto& s) { s.type = static_cast<AttributeType>(type); }), Refusal(bad, "type"));
+    EXPECT_EQ(RefusalAfter([=](auto& s) { s.type = static_cast<AttributeType>(type); }),
+              Refusal(bad, "type"));
   }
   for (int components : {-1, 0, 17}) {
     EXPECT_EQ(RefusalAfter([=](auto& s) { s.components = components; }), Refusal(bad, "components"));
@@ -66,7 +67,9 @@ TEST(AttributeSpecTest, EachFieldThatIsWrongIsNamed) {
               Refusal(reason::kBadArrayLength, "default_row"));
   }
   for (float value : {std::numeric_limits<float>::quiet_NaN(), -std::numeric_limits<float>::infinity()}) {
-    EXPECT_EQ(RefusalAfter([=](auto& s) { s.default_row = RowOf<float>({0, value}); }),
+    EXPECT_EQ(RefusalAfter([=](auto& s) {
+                s.default_row = RowOf<float>({0, value});
+              }),
               Refusal(reason::kNonFinite, "default_row"));
   }
 }
@@ -122,9 +125,9 @@ TEST(AttributesTest, ANewOccupantHasTheDefaultAndRollbackTheRowsBefore) {
   mesh.BeginBatch();
   ASSERT_TRUE(mesh.RemoveElement(CellId(0)).ok());
   ASSERT_TRUE(mesh.AddAttribute({"b", EntityKind::kFace, AttributeType::kUint8, 1}).ok());
-  ASSERT_TRUE(mesh.SetAttribute(0, Add(mesh, ElementType::kTetrahedron, {0, 1, 2, 3}).slot,
-                                RowOf<int64_t>({5}))
-                  .ok());
+  ASSERT_TRUE(
+      mesh.SetAttribute(0, Add(mesh, ElementType::kTetrahedron, {0, 1, 2, 3}).slot, RowOf<int64_t>({5}))
+          .ok());
   mesh.Rollback();
   EXPECT_EQ(Describe(mesh), before);
   ASSERT_TRUE(mesh.RemoveElement(CellId(0)).ok());
