@@ -31,8 +31,8 @@ Packed PackSpec(int version, const AttributeSpec& spec) {
   }
   out.Bytes(spec.name);
   if (!spec.has_zero_default()) {
-    out.Bytes(absl::string_view(reinterpret_cast<const char*>(spec.default_row.data()),
-                                spec.default_row.size()));
+    out.Bytes(
+        absl::string_view(reinterpret_cast<const char*>(spec.default_row.data()), spec.default_row.size()));
   }
   const uint64_t count = out.size();
   return {Packing::kRaw, count, std::move(out).Take()};

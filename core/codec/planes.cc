@@ -16,8 +16,8 @@ namespace {
 
 constexpr size_t kMinPartBytes = 256;  // shorter planes share zstd's statistics, as its tables cost more
 
-// The unsigned word that ascends with a scalar's value, so that near values have small differences: floating-point
-// numbers by sign and bits, integers as their bits.
+// The unsigned word that ascends with a scalar's value, so that near values have small differences:
+// floating-point numbers by sign and bits, integers as their bits.
 template <typename Scalar>
 struct Words {
   static constexpr bool kIsFloat = std::is_floating_point_v<Scalar>;

@@ -2,7 +2,6 @@
 
 #include <new>
 #include <stdexcept>
-#include <utility>
 
 #include "absl/container/inlined_vector.h"
 #include "absl/strings/str_cat.h"
@@ -39,7 +38,9 @@ class ElementRows {
     size_t next = begins_[i];
     for (int column : ColumnsOf(mesh, to.kind)) {
       const bool saved = next < begins_[i + 1] && rows_[next].column == column;
-      const auto row = saved ? absl::MakeConstSpan(rows_[next++].bytes) : mesh.attributes()[column].default_row();
+      const AttributeColumn& values = mesh.attributes()[column];
+      const size_t size = values.spec().row_bytes();
+      const auto row = saved ? pool_.At(rows_[next++].begin, size) : values.default_row();
       DYNMESH_RETURN_IF_ERROR(writer.Set(column, to.slot, row));
     }
     return absl::OkStatus();
@@ -48,16 +49,17 @@ class ElementRows {
  private:
   struct Row {
     int column;
-    std::vector<uint8_t> bytes;
+    size_t begin;  ///< in pool_
   };
 
   void Save(const AttributeColumn& values, int column, Slot slot) {
-    std::vector<uint8_t> row = MixRows(values, {RowShare{values.Row(slot)}});
-    if (row != values.default_row()) rows_.push_back({column, std::move(row)});
+    const std::vector<uint8_t> row = MixRows(values, {RowShare{values.Row(slot)}});
+    if (row != values.default_row()) rows_.push_back({column, pool_.Add(row)});
   }
 
   std::vector<Row> rows_;       ///< that are not the default: of one element after the other, by column
   std::vector<size_t> begins_;  ///< of each element, and the end
+  RowPool pool_;
 };
 
 absl::Status BlendAttributes(const Mesh& mesh, const Blend& blend, VertexId to, RowWriter& writer) {
@@ -109,9 +111,8 @@ absl::Status ReplaceElements(Mesh& mesh, const Patch& patch, AppliedPatch& appli
   return absl::OkStatus();
 }
 
-absl::Status Apply(Mesh& mesh, const Patch& patch, AppliedPatch& applied) {
+absl::Status Apply(Mesh& mesh, const Patch& patch, AppliedPatch& applied, RowWriter& writer) {
   const int64_t before = EulerCharacteristic(mesh);
-  RowWriter writer(mesh, applied.attribute_bytes);
   DYNMESH_RETURN_IF_ERROR(PlaceVertices(mesh, patch, applied, writer));
   DYNMESH_RETURN_IF_ERROR(ReplaceElements(mesh, patch, applied, writer));
   for (VertexId v : patch.removed_vertices) DYNMESH_RETURN_IF_ERROR(mesh.RemoveVertex(v));
@@ -135,12 +136,13 @@ void PutBack(Mesh& mesh, Mesh::Savepoint savepoint) try {
 
 }  // namespace
 
-absl::Status ApplyPatch(Mesh& mesh, const Patch& patch, AppliedPatch& applied) {
+absl::Status ApplyPatch(Mesh& mesh, const Patch& patch, AppliedPatch& applied, uint64_t max_attribute_bytes) {
   const Mesh::Savepoint savepoint = mesh.MakeSavepoint();
   applied.new_vertices.clear();
   applied.added.clear();
-  applied.attribute_bytes = 0;
-  absl::Status status = Apply(mesh, patch, applied);
+  RowWriter writer(mesh, max_attribute_bytes);
+  absl::Status status = Apply(mesh, patch, applied, writer);
+  applied.attribute_bytes = writer.bytes();
   if (!status.ok()) PutBack(mesh, savepoint);
   return status;
 }

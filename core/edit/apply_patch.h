@@ -1,6 +1,8 @@
 #ifndef DYNMESH_CORE_EDIT_APPLY_PATCH_H_
 #define DYNMESH_CORE_EDIT_APPLY_PATCH_H_
 
+#include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -21,9 +23,11 @@ struct AppliedPatch {
 /// vertices those of their blend, kept vertices those of both; for edges and faces see derived_rows.h.
 ///
 /// Errors: those of Mesh's edits; FAILED_PRECONDITION WOULD_CHANGE_TOPOLOGY when the Euler characteristic
-/// (vertices - edges + faces - cells) would change and Patch::check_euler is set. Nothing has changed then.
-/// REQUIRES: a batch is open; the mesh is as it was when the patch was planned. Cost: linear in the patch.
-absl::Status ApplyPatch(Mesh& mesh, const Patch& patch, AppliedPatch& applied);
+/// (vertices - edges + faces - cells) would change and Patch::check_euler is set; RESOURCE_EXHAUSTED when
+/// attributes take more than `max_attribute_bytes`. Nothing has changed then. REQUIRES: a batch is open; the
+/// mesh is as it was when the patch was planned. Cost: linear in the patch.
+absl::Status ApplyPatch(Mesh& mesh, const Patch& patch, AppliedPatch& applied,
+                        uint64_t max_attribute_bytes = std::numeric_limits<uint64_t>::max());
 
 }  // namespace dynmesh
 

@@ -18,8 +18,10 @@ DerivedRows::DerivedRows(const Mesh& mesh, const Patch& patch, absl::Span<const 
 
 absl::Status DerivedRows::PassOn(RowWriter& writer) const {
   for (const Row& row : rows_) {
-    const Slot heir = Find(row.heir);
-    if (heir != kNoSlot) DYNMESH_RETURN_IF_ERROR(writer.Set(row.column, heir, row.bytes));
+    const Slot heir = Find(heirs_[row.heir]);
+    if (heir == kNoSlot) continue;
+    const size_t size = mesh_.attributes()[row.column].spec().row_bytes();
+    DYNMESH_RETURN_IF_ERROR(writer.Set(row.column, heir, pool_.At(row.begin, size)));
   }
   return absl::OkStatus();
 }
@@ -55,14 +57,16 @@ void DerivedRows::Keep(EntityId parent, const Polygon& heir) {
   const bool is_edge = parent.kind == EntityKind::kEdge;
   if (heir.size < (is_edge ? 2 : 3) || mesh_.IsDuplicate(parent)) return;
   const Slot there = Find(heir);
+  const auto index = static_cast<uint32_t>(heirs_.size());
   for (int column : is_edge ? edge_columns_ : face_columns_) {
     const AttributeColumn& values = mesh_.attributes()[column];
     const RowShare passed{values.Row(parent.slot), there == kNoSlot ? 1.0 : 0.0};
     const auto before = there == kNoSlot ? values.default_row() : values.Row(there);
-    std::vector<uint8_t> row =
+    const std::vector<uint8_t> row =
         there == kNoSlot ? MixRows(values, {passed}) : MixRows(values, {RowShare{before}, passed});
-    if (row != before) rows_.push_back({column, heir, std::move(row)});
+    if (row != before) rows_.push_back({index, column, pool_.Add(row)});
   }
+  if (!rows_.empty() && rows_.back().heir == index) heirs_.push_back(heir);
 }
 
 /// The edge or face with these vertices.

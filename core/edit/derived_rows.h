@@ -35,9 +35,9 @@ class DerivedRows {
 
  private:
   struct Row {
+    uint32_t heir;
     int column;
-    Polygon heir;
-    std::vector<uint8_t> bytes;
+    size_t begin;  ///< in pool_
   };
 
   void Keep(const Patch::Cut& cut, VertexId middle);
@@ -47,7 +47,9 @@ class DerivedRows {
 
   const Mesh& mesh_;
   const absl::InlinedVector<int, 4> edge_columns_, face_columns_;
+  std::vector<Polygon> heirs_;
   std::vector<Row> rows_;
+  RowPool pool_;
 };
 
 }  // namespace dynmesh

@@ -49,6 +49,7 @@ def test_columns_of_each_type_travel_to_files_and_mirrors_as_they_are(session, d
     session.import_mesh(mesh)
     assert session.info().attributes[0].dtype == np.dtype(dtype).name
     with session.mirror() as mirror:
+        mirror.wait(1, timeout=20)
         for copy in (session.to_meshio(), mirror.to_meshio()):
             assert copy.point_data["t"].dtype == dtype
             assert (copy.point_data["t"] == mesh.point_data["t"]).all()
@@ -60,24 +61,26 @@ def test_a_default_is_the_row_of_whoever_has_none(session, codec):
     with session.mirror(codec=codec) as early:
         with session.edit() as tx:
             tx.add_attribute("t", "vertex", np.float32, 2, default=[0.5, -1], policy="max")
-            tx.add_attribute("q", "cell", np.int64, default=-7)
+            tx.add_attribute("q", "edge", np.int64, default=-7)
             tx.set_attribute("t", "vertex", [3], [[1, 2]])
         with session.edit() as tx:
             tx.remove_elements("cell", [0])
             tx.remove_vertices([3])
         with session.edit() as tx:
             tx.add_vertices([[0, 0, 2], [0, 0, 3]])
+        with session.edit() as tx:
             tx.set_attribute("t", "vertex", [4], [[3, 4]])
-        early.wait(4, timeout=20)
+        early.wait(5, timeout=20)
         with session.mirror(codec=codec) as late:
+            late.wait(5, timeout=20)
             for mirror in (early, late):
                 assert mirror.attribute("t", "vertex").tolist() == 4 * [[0.5, -1]] + [[3, 4]]
-                assert mirror.attribute("q", "cell").size == 0
+                assert mirror.attribute("q", "edge").size == 0
                 assert mirror.to_meshio().cell_data["q"][0].tolist() == [-7]
     assert session.to_meshio().point_data["t"].tolist() == 4 * [[0.5, -1]] + [[3, 4]]
     assert session.info().attributes == (
         ("t", dynmesh.EntityKind.VERTEX, "float32", 2, "max", (0.5, -1.0)),
-        ("q", dynmesh.EntityKind.CELL, "int64", 1, "copy", (-7,)),
+        ("q", dynmesh.EntityKind.EDGE, "int64", 1, "copy", (-7,)),
     )
 
 

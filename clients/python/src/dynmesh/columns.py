@@ -92,7 +92,7 @@ def as_values(values: ArrayLike, name: str) -> NDArray[Any]:
     dtype = _nearest(rows.dtype)
     if dtype is None:
         raise _unfit(name, f"is {rows.dtype}; columns are {DTYPE_NAMES}")
-    if rows.dtype == np.uint64 and rows.size and rows.max() > np.iinfo(np.int64).max:
+    if rows.dtype == np.uint64 and rows.size and int(rows.max()) > np.iinfo(np.int64).max:
         raise _unfit(name, "is uint64 with values that int64 cannot hold")
     return rows.astype(dtype, copy=False)
 

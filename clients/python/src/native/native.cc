@@ -79,8 +79,8 @@ py::array Values(const AttributeChanges& changes, const py::object& owner) {
 py::array DefaultRow(const AttributeSpec& spec) {
   const AttributeColumn column(spec);
   return WithScalar(spec.type, [&](auto scalar) -> py::array {
-    return py::array_t<decltype(scalar)>(spec.components,
-                                         reinterpret_cast<const decltype(scalar)*>(column.default_row().data()));
+    return py::array_t<decltype(scalar)>(
+        spec.components, reinterpret_cast<const decltype(scalar)*>(column.default_row().data()));
   });
 }
 
