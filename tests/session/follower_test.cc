@@ -6,6 +6,7 @@
 #include "tests/session/session_support.h"
 #include "tests/support/meshes.h"
 #include "tests/support/oracle.h"
+#include "tests/support/rows.h"
 
 namespace dynmesh::testing {
 namespace {
