@@ -1,7 +1,6 @@
 #include "core/edit/derived_rows.h"
 
 #include <algorithm>
-#include <utility>
 
 #include "core/edit/mix_rows.h"
 
