@@ -47,6 +47,7 @@ absl::Status CheckGrid(const QuantizationGrid& grid) {
 
 MessageHeader HeaderOf(const Delta& delta, const QuantizationGrid& grid) {
   MessageHeader header;
+  header.version = VersionFor(delta.attributes);
   header.delta.from_revision = delta.from_revision;
   header.delta.to_revision = delta.to_revision;
   header.delta.consistent = delta.consistent;
@@ -118,7 +119,7 @@ absl::StatusOr<Delta> Decode(absl::string_view bytes, const DecodeLimits& limits
   for (EntityKind kind : kElementKinds) {
     DYNMESH_RETURN_IF_ERROR(DecodeElements(kind, sections, delta.OfKind(kind)));
   }
-  DYNMESH_ASSIGN_OR_RETURN(delta.attributes, DecodeAttributes(sections));
+  DYNMESH_ASSIGN_OR_RETURN(delta.attributes, DecodeAttributes(message.header.version, sections));
   if (!sections.done()) return CorruptPayload("the message has a section that does not belong");
   DYNMESH_RETURN_IF_ERROR(CheckDelta(delta));
   return delta;

@@ -13,7 +13,6 @@ namespace dynmesh {
 namespace {
 
 constexpr absl::string_view kMagic("DYNM", 4);
-constexpr uint8_t kVersion = 1;
 constexpr uint8_t kConsistentFlag = 1;
 constexpr int kMaxBits = 30;
 constexpr size_t kChecksumBytes = sizeof(uint64_t);
@@ -29,7 +28,7 @@ uint64_t DecodedBytes(uint32_t id, uint64_t count) {
 
 void WriteHeader(const MessageHeader& header, ByteWriter& out) {
   out.Bytes(kMagic);
-  out.Fixed<uint8_t>(kVersion);
+  out.Fixed<uint8_t>(header.version);
   out.Fixed<uint8_t>(header.delta.consistent ? kConsistentFlag : 0);
   out.Fixed<uint8_t>(header.grid.bits);
   out.Fixed<uint8_t>(0);
@@ -54,11 +53,11 @@ absl::Status CheckVersion(absl::string_view bytes) {
     return CorruptPayload("the bytes are not a dynmesh message");
   }
   const int version = static_cast<uint8_t>(bytes[kMagic.size()]);
-  if (version == kVersion) return absl::OkStatus();
-  return MakeError(
-      absl::StatusCode::kUnimplemented, reason::kUnsupportedFormat,
-      absl::StrCat("the message is of format version ", version, ", and this build reads version 1"),
-      {{"version", absl::StrCat(version)}});
+  if (version >= kFirstVersion && version <= kLatestVersion) return absl::OkStatus();
+  return MakeError(absl::StatusCode::kUnimplemented, reason::kUnsupportedFormat,
+                   absl::StrCat("the message is of format version ", version, ", and this build reads ",
+                                kFirstVersion, " to ", kLatestVersion),
+                   {{"version", absl::StrCat(version)}});
 }
 
 absl::StatusOr<absl::string_view> CheckSeal(absl::string_view bytes) {
@@ -85,7 +84,8 @@ absl::Status ReadGrid(ByteReader& in, QuantizationGrid& grid) {
 
 absl::StatusOr<MessageHeader> ReadHeader(ByteReader& in) {
   MessageHeader header;
-  in.Bytes(kMagic.size() + sizeof(kVersion));
+  in.Bytes(kMagic.size());
+  header.version = in.Fixed<uint8_t>();
   const uint8_t flags = in.Fixed<uint8_t>();
   header.grid.bits = header.delta.position_bits = in.Fixed<uint8_t>();
   const uint8_t reserved = in.Fixed<uint8_t>();

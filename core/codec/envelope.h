@@ -76,7 +76,13 @@ struct Section {
   absl::string_view bytes;
 };
 
+/// Versions of the format: the second one describes attribute columns in more words. A message is of the
+/// lowest that can say what it says, so that old readers read what old writers could have written.
+inline constexpr int kFirstVersion = 1;
+inline constexpr int kLatestVersion = 2;
+
 struct MessageHeader {
+  int version = kFirstVersion;
   DeltaHeader delta;
   QuantizationGrid grid;  ///< bits 0: lossless
 };

@@ -3,6 +3,7 @@
 #include <cassert>
 #include <cstring>
 #include <string>
+#include <type_traits>
 #include <utility>
 
 #include "core/codec/bytes.h"
@@ -15,12 +16,24 @@ namespace {
 
 constexpr size_t kMinPartBytes = 256;  // shorter planes share zstd's statistics, as its tables cost more
 
-// Bits of a float64 as an integer that ascends with its value, so that near values have small differences.
-constexpr uint64_t kSign = uint64_t{1} << 63;
-uint64_t Order(uint64_t bits) { return bits & kSign ? ~bits : bits | kSign; }
-uint64_t Unorder(uint64_t key) { return key & kSign ? key & ~kSign : ~key; }
-uint32_t Order(uint32_t bits) { return bits; }
-uint32_t Unorder(uint32_t key) { return key; }
+// The unsigned word that ascends with a scalar's value, so that near values have small differences:
+// floating-point numbers by sign and bits, integers as their bits.
+template <typename Scalar>
+struct Words {
+  static constexpr bool kIsFloat = std::is_floating_point_v<Scalar>;
+  using Word = std::conditional_t<sizeof(Scalar) == 8, uint64_t,
+                                  std::conditional_t<sizeof(Scalar) == 4, uint32_t, uint8_t>>;
+  static constexpr Word kSign = static_cast<Word>(Word{1} << (8 * sizeof(Word) - 1));
+
+  static Word Order(Word bits) {
+    if constexpr (!kIsFloat) return bits;
+    return bits & kSign ? static_cast<Word>(~bits) : bits | kSign;
+  }
+  static Word Unorder(Word key) {
+    if constexpr (!kIsFloat) return key;
+    return key & kSign ? key & static_cast<Word>(~kSign) : static_cast<Word>(~key);
+  }
+};
 
 // One component of `num_rows` rows: where it begins in the first row, and the stride between rows.
 template <typename Byte>
@@ -30,30 +43,33 @@ struct Column {
   size_t num_rows;
 };
 
-template <typename Word>
+template <typename Scalar>
 void SplitColumn(const Column<const uint8_t>& column, char* planes) {
+  using Word = typename Words<Scalar>::Word;
   Word previous = 0;
   for (size_t row = 0; row < column.num_rows; ++row) {
     Word word;
     std::memcpy(&word, column.begin + row * column.stride, sizeof(word));
-    const Word key = Order(word);
-    const Word code = ZigZag<Word>(key - std::exchange(previous, key));
+    const Word key = Words<Scalar>::Order(word);
+    const Word code = ZigZag<Word>(static_cast<Word>(key - std::exchange(previous, key)));
     for (size_t b = 0; b < sizeof(Word); ++b) {
       planes[b * column.num_rows + row] = static_cast<char>(code >> (8 * b));
     }
   }
 }
 
-template <typename Word>
+template <typename Scalar>
 void JoinColumn(const char* planes, const Column<uint8_t>& column) {
+  using Word = typename Words<Scalar>::Word;
   Word key = 0;
   for (size_t row = 0; row < column.num_rows; ++row) {
     Word code = 0;
     for (size_t b = 0; b < sizeof(Word); ++b) {
-      code |= static_cast<Word>(static_cast<uint8_t>(planes[b * column.num_rows + row])) << (8 * b);
+      const auto byte = static_cast<uint8_t>(planes[b * column.num_rows + row]);
+      code = static_cast<Word>(code | static_cast<Word>(byte) << (8 * b));
     }
-    key += UnZigZag(code);
-    const Word word = Unorder(key);
+    key = static_cast<Word>(key + UnZigZag<Word>(code));
+    const Word word = Words<Scalar>::Unorder(key);
     std::memcpy(column.begin + row * column.stride, &word, sizeof(word));
   }
 }
@@ -65,7 +81,7 @@ std::string SplitPlanes(absl::Span<const uint8_t> rows, const RowShape& shape) {
   for (int c = 0; c < shape.components; ++c) {
     const Column<const uint8_t> column{rows.data() + c * width, shape.row_bytes(), num_rows};
     char* out = planes.data() + c * width * num_rows;
-    width == 8 ? SplitColumn<uint64_t>(column, out) : SplitColumn<uint32_t>(column, out);
+    WithScalar(shape.type, [&](auto scalar) { SplitColumn<decltype(scalar)>(column, out); });
   }
   return planes;
 }
@@ -77,7 +93,7 @@ std::vector<uint8_t> JoinPlanes(absl::string_view planes, const RowShape& shape)
   for (int c = 0; c < shape.components; ++c) {
     const Column<uint8_t> column{rows.data() + c * width, shape.row_bytes(), num_rows};
     const char* in = planes.data() + c * width * num_rows;
-    width == 8 ? JoinColumn<uint64_t>(in, column) : JoinColumn<uint32_t>(in, column);
+    WithScalar(shape.type, [&](auto scalar) { JoinColumn<decltype(scalar)>(in, column); });
   }
   return rows;
 }

@@ -33,11 +33,12 @@ absl::StatusOr<std::vector<Slot>> UnpackSlots(const Section& section);
 /// The bijection of signed on unsigned integers that keeps small ones small: 0, -1, 1, -2, ...
 template <typename Unsigned>
 constexpr Unsigned ZigZag(Unsigned difference) {
-  return (difference << 1) ^ (Unsigned{0} - (difference >> (8 * sizeof(Unsigned) - 1)));
+  return static_cast<Unsigned>((difference << 1) ^
+                               (Unsigned{0} - (difference >> (8 * sizeof(Unsigned) - 1))));
 }
 template <typename Unsigned>
 constexpr Unsigned UnZigZag(Unsigned symbol) {
-  return (symbol >> 1) ^ (Unsigned{0} - (symbol & 1));
+  return static_cast<Unsigned>((symbol >> 1) ^ (Unsigned{0} - (symbol & 1)));
 }
 
 }  // namespace dynmesh

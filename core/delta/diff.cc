@@ -139,7 +139,7 @@ class DiffBuilder {
     slots.insert(slots.end(), range.begin(), range.begin() + (end - begin));
   }
 
-  /// Rows of dead slots travel too, as the zeros that removal left: derived entities die unseen by a mirror.
+  /// Rows of dead slots travel too, as the defaults that removal left: derived entities die unseen by a mirror.
   void VisitRows(const DiffCursor& cursor, Slot end) {
     if (cursor.column >= static_cast<int>(mesh_.attributes().size())) return;
     const AttributeColumn& column = mesh_.attributes()[cursor.column];

@@ -136,7 +136,7 @@ absl::Status Mirror::CheckColumns(const Delta& delta) {
     const AttributeColumn* column = FindColumn(changes.spec);
     if (column != nullptr && column->spec() != changes.spec) {
       return MakeError(absl::StatusCode::kDataLoss, reason::kCorruptPayload,
-                       absl::StrCat("attribute '", changes.spec.name, "' changed its type"));
+                       absl::StrCat("attribute '", changes.spec.name, "' is described otherwise than before"));
     }
   }
   return absl::OkStatus();

@@ -1,17 +1,17 @@
 #include "core/edit/apply_patch.h"
 
-#include <algorithm>
-#include <cstring>
 #include <new>
 #include <stdexcept>
 
+#include "absl/container/inlined_vector.h"
 #include "absl/strings/str_cat.h"
+#include "core/edit/derived_rows.h"
+#include "core/edit/mix_rows.h"
+#include "core/edit/row_writer.h"
 #include "core/edit/star.h"
 
 namespace dynmesh {
 namespace {
-
-constexpr uint64_t kBytesOfRow = 32;  ///< its stamp and journal entry
 
 int64_t EulerCharacteristic(const Mesh& mesh) {
   int64_t sum = 0;
@@ -20,37 +20,28 @@ int64_t EulerCharacteristic(const Mesh& mesh) {
   return sum;
 }
 
-/// Sets a row unless it is as wanted already; counts the bytes.
-absl::Status SetRow(Mesh& mesh, int column, Slot slot, absl::Span<const uint8_t> row, uint64_t& bytes) {
-  if (mesh.attributes()[column].Row(slot) == row) return absl::OkStatus();
-  bytes += kBytesOfRow + 2 * row.size();  // in the column and in the journal
-  return mesh.SetAttribute(column, slot, row);
-}
-
-/// Rows that outlive the entities which had them.
-class SavedRows {
+/// Rows of elements that outlive them.
+class ElementRows {
  public:
-  SavedRows(const Mesh& mesh, absl::Span<const EntityId> entities) {
+  ElementRows(const Mesh& mesh, absl::Span<const EntityId> elements) {
     if (mesh.attributes().empty()) return;
-    for (EntityId id : entities) {
+    for (EntityId id : elements) {
       begins_.push_back(rows_.size());
-      for (size_t column = 0; column < mesh.attributes().size(); ++column) {
-        if (mesh.attributes()[column].spec().kind == id.kind) Save(mesh, column, id.slot);
-      }
+      for (int column : ColumnsOf(mesh, id.kind)) Save(mesh.attributes()[column], column, id.slot);
     }
     begins_.push_back(rows_.size());
   }
 
-  /// Gives `to` the rows of the i-th entity, which is of the same kind.
-  absl::Status CopyTo(Mesh& mesh, size_t i, EntityId to, uint64_t& bytes) const {
+  /// Gives `to` the rows of the i-th element, which is of the same kind.
+  absl::Status PassOn(const Mesh& mesh, size_t i, EntityId to, RowWriter& writer) const {
     if (begins_.empty()) return absl::OkStatus();
     size_t next = begins_[i];
-    for (int column = 0; column < static_cast<int>(mesh.attributes().size()); ++column) {
-      const AttributeSpec& spec = mesh.attributes()[column].spec();
-      if (spec.kind != to.kind) continue;
+    for (int column : ColumnsOf(mesh, to.kind)) {
       const bool saved = next < begins_[i + 1] && rows_[next].column == column;
-      const std::vector<uint8_t> row = saved ? rows_[next++].bytes : std::vector<uint8_t>(spec.row_bytes());
-      DYNMESH_RETURN_IF_ERROR(SetRow(mesh, column, to.slot, row, bytes));
+      const AttributeColumn& values = mesh.attributes()[column];
+      const size_t size = values.spec().row_bytes();
+      const auto row = saved ? pool_.At(rows_[next++].begin, size) : values.default_row();
+      DYNMESH_RETURN_IF_ERROR(writer.Set(column, to.slot, row));
     }
     return absl::OkStatus();
   }
@@ -58,82 +49,72 @@ class SavedRows {
  private:
   struct Row {
     int column;
-    std::vector<uint8_t> bytes;
+    size_t begin;  ///< in pool_
   };
 
-  void Save(const Mesh& mesh, int column, Slot slot) {
-    const auto bytes = mesh.attributes()[column].Row(slot);
-    const bool zero = std::all_of(bytes.begin(), bytes.end(), [](uint8_t byte) { return byte == 0; });
-    if (!zero) rows_.push_back({column, {bytes.begin(), bytes.end()}});
+  void Save(const AttributeColumn& values, int column, Slot slot) {
+    const std::vector<uint8_t> row = MixRows(values, {RowShare{values.Row(slot)}});
+    if (row != values.default_row()) rows_.push_back({column, pool_.Add(row)});
   }
 
-  std::vector<Row> rows_;       ///< that are not all zeros: of one entity after the other, by column
-  std::vector<size_t> begins_;  ///< of each entity, and the end
+  std::vector<Row> rows_;       ///< that are not the default: of one element after the other, by column
+  std::vector<size_t> begins_;  ///< of each element, and the end
+  RowPool pool_;
 };
 
-std::vector<uint8_t> BlendRows(const AttributeColumn& column, const Blend& blend) {
-  const size_t heaviest =
-      std::max_element(blend.weights.begin(), blend.weights.end()) - blend.weights.begin();
-  const auto copied = column.Row(blend.vertices[heaviest].slot());
-  std::vector<uint8_t> row(copied.begin(), copied.end());
-  if (column.spec().type != AttributeType::kFloat64) return row;
-  std::vector<double> sum(column.spec().components);
-  for (size_t i = 0; i < blend.vertices.size(); ++i) {
-    const auto bytes = column.Row(blend.vertices[i].slot());
-    for (size_t k = 0; k < sum.size(); ++k) {
-      double value;
-      std::memcpy(&value, &bytes[k * sizeof(value)], sizeof(value));
-      sum[k] += blend.weights[i] * value;
+absl::Status BlendAttributes(const Mesh& mesh, const Blend& blend, VertexId to, RowWriter& writer) {
+  if (mesh.attributes().empty() || blend.vertices.empty()) return absl::OkStatus();
+  absl::InlinedVector<RowShare, 4> parents(blend.vertices.size());
+  for (int column : ColumnsOf(mesh, EntityKind::kVertex)) {
+    const AttributeColumn& values = mesh.attributes()[column];
+    for (size_t i = 0; i < parents.size(); ++i) {
+      parents[i] = {values.Row(blend.vertices[i].slot()), blend.weights[i]};
     }
-  }
-  std::memcpy(row.data(), sum.data(), row.size());
-  return row;
-}
-
-absl::Status BlendAttributes(Mesh& mesh, const Blend& blend, VertexId to, uint64_t& bytes) {
-  if (blend.vertices.empty()) return absl::OkStatus();
-  for (size_t column = 0; column < mesh.attributes().size(); ++column) {
-    if (mesh.attributes()[column].spec().kind != EntityKind::kVertex) continue;
-    DYNMESH_RETURN_IF_ERROR(
-        SetRow(mesh, column, to.slot(), BlendRows(mesh.attributes()[column], blend), bytes));
+    DYNMESH_RETURN_IF_ERROR(writer.Set(column, to.slot(), MixRows(values, parents)));
   }
   return absl::OkStatus();
 }
 
-absl::Status PlaceVertices(Mesh& mesh, const Patch& patch, AppliedPatch& applied) {
+/// New vertices may lie between those that others merge into, so these come first.
+absl::Status PlaceVertices(Mesh& mesh, const Patch& patch, AppliedPatch& applied, RowWriter& writer) {
+  for (const Patch::Merger& merger : patch.mergers) {
+    const Blend blend{{merger.kept, merger.gone}, {1 - merger.weight, merger.weight}};
+    DYNMESH_RETURN_IF_ERROR(BlendAttributes(mesh, blend, merger.kept, writer));
+  }
   for (const Patch::NewVertex& vertex : patch.new_vertices) {
     DYNMESH_ASSIGN_OR_RETURN(const VertexId v, mesh.AddVertex(vertex.position));
-    DYNMESH_RETURN_IF_ERROR(BlendAttributes(mesh, vertex.blend, v, applied.attribute_bytes));
+    DYNMESH_RETURN_IF_ERROR(BlendAttributes(mesh, vertex.blend, v, writer));
     applied.new_vertices.push_back(v);
   }
   for (const Patch::Move& move : patch.moves) {
     DYNMESH_RETURN_IF_ERROR(mesh.MoveVertex(move.vertex, move.position));
-    DYNMESH_RETURN_IF_ERROR(BlendAttributes(mesh, move.blend, move.vertex, applied.attribute_bytes));
   }
   return absl::OkStatus();
 }
 
-absl::Status ReplaceElements(Mesh& mesh, const Patch& patch, AppliedPatch& applied) {
+absl::Status ReplaceElements(Mesh& mesh, const Patch& patch, AppliedPatch& applied, RowWriter& writer) {
   std::vector<NewElement> added = patch.added;
   for (NewElement& element : added) {
     for (VertexId& v : element.mutable_vertices()) {
       if (v.slot() & kNewVertex) v = applied.new_vertices[v.slot() & ~kNewVertex];
     }
   }
-  const SavedRows rows(mesh, patch.removed);
+  const DerivedRows derived(mesh, patch, applied.new_vertices);
+  const ElementRows rows(mesh, patch.removed);
   applied.added.resize(added.size());
   DYNMESH_RETURN_IF_ERROR(
       mesh.ReplaceElements(patch.removed, added, [&](size_t i, EntityId id) { applied.added[i] = id; }));
+  DYNMESH_RETURN_IF_ERROR(derived.PassOn(writer));
   for (size_t i = 0; i < added.size(); ++i) {
-    DYNMESH_RETURN_IF_ERROR(rows.CopyTo(mesh, patch.parents[i], applied.added[i], applied.attribute_bytes));
+    DYNMESH_RETURN_IF_ERROR(rows.PassOn(mesh, patch.parents[i], applied.added[i], writer));
   }
   return absl::OkStatus();
 }
 
-absl::Status Apply(Mesh& mesh, const Patch& patch, AppliedPatch& applied) {
+absl::Status Apply(Mesh& mesh, const Patch& patch, AppliedPatch& applied, RowWriter& writer) {
   const int64_t before = EulerCharacteristic(mesh);
-  DYNMESH_RETURN_IF_ERROR(PlaceVertices(mesh, patch, applied));
-  DYNMESH_RETURN_IF_ERROR(ReplaceElements(mesh, patch, applied));
+  DYNMESH_RETURN_IF_ERROR(PlaceVertices(mesh, patch, applied, writer));
+  DYNMESH_RETURN_IF_ERROR(ReplaceElements(mesh, patch, applied, writer));
   for (VertexId v : patch.removed_vertices) DYNMESH_RETURN_IF_ERROR(mesh.RemoveVertex(v));
   const int64_t after = EulerCharacteristic(mesh);
   if (after == before || !patch.check_euler) return absl::OkStatus();
@@ -155,12 +136,13 @@ void PutBack(Mesh& mesh, Mesh::Savepoint savepoint) try {
 
 }  // namespace
 
-absl::Status ApplyPatch(Mesh& mesh, const Patch& patch, AppliedPatch& applied) {
+absl::Status ApplyPatch(Mesh& mesh, const Patch& patch, AppliedPatch& applied, uint64_t max_attribute_bytes) {
   const Mesh::Savepoint savepoint = mesh.MakeSavepoint();
   applied.new_vertices.clear();
   applied.added.clear();
-  applied.attribute_bytes = 0;
-  absl::Status status = Apply(mesh, patch, applied);
+  RowWriter writer(mesh, max_attribute_bytes);
+  absl::Status status = Apply(mesh, patch, applied, writer);
+  applied.attribute_bytes = writer.bytes();
   if (!status.ok()) PutBack(mesh, savepoint);
   return status;
 }

@@ -6,19 +6,12 @@
 #include "absl/container/inlined_vector.h"
 #include "absl/strings/str_cat.h"
 #include "core/edit/cone.h"
+#include "core/edit/polygon.h"
 #include "core/edit/star.h"
 #include "core/mesh/vector.h"
 
 namespace dynmesh {
 namespace {
-
-/// Up to four vertices of a face after a collapse.
-struct Polygon {
-  std::array<VertexId, kMaxFaceVertices> vertices;
-  size_t size = 0;
-
-  absl::Span<const VertexId> span() const { return absl::MakeConstSpan(vertices.data(), size); }
-};
 
 /// Edges from one vertex, for many look-ups.
 class EdgesFrom {
@@ -277,17 +270,6 @@ class Collapser {
                   element.kind, {element.slot});
   }
 
-  /// The cycle with the two ends as one; they follow each other, or the size is 0 in a triangle's place.
-  Polygon Shrunk(absl::Span<const VertexId> cycle) const {
-    Polygon shrunk;
-    const bool both = Contains(cycle, kept_) && Contains(cycle, gone_);
-    for (VertexId v : cycle) {
-      if (v == gone_ && both) continue;
-      shrunk.vertices[shrunk.size++] = v == gone_ ? kept_ : v;
-    }
-    return shrunk;
-  }
-
   static bool AreOpposite(absl::Span<const VertexId> cycle, VertexId a, VertexId b) {
     return cycle.size() == 4 && ((cycle[0] == a && cycle[2] == b) || (cycle[0] == b && cycle[2] == a) ||
                                  (cycle[1] == a && cycle[3] == b) || (cycle[1] == b && cycle[3] == a));
@@ -295,7 +277,7 @@ class Collapser {
 
   absl::Status CollapseFace(EntityId element, absl::Span<const VertexId> vertices) {
     if (AreOpposite(vertices, kept_, gone_)) return RefuseCorners(element);
-    const Polygon shrunk = Shrunk(vertices);
+    const Polygon shrunk = Merged(vertices, kept_, gone_);
     if (shrunk.size == 3) patch_.Add(ElementType::kTriangle, shrunk.span());
     return absl::OkStatus();
   }
@@ -309,7 +291,7 @@ class Collapser {
       const FaceVertices face(shape.faces[i], vertices);
       const auto span = face.span();
       if (AreOpposite(span, kept_, gone_)) return RefuseCorners(element);
-      const Polygon shrunk = Shrunk(span);
+      const Polygon shrunk = Merged(span, kept_, gone_);
       merged += shrunk.size < span.size();
       if (shrunk.size < 3) continue;
       cone &= shrunk.size == 3 || !Contains(shrunk.span(), kept_);
@@ -355,13 +337,14 @@ absl::Status PlanCollapseEdge(const Mesh& mesh, EdgeId e, const CollapsePlace& p
   const bool stays = !place.position && (t == 0 || t == 1);
   if (!stays) {
     patch.work += WorkOfStar(mesh, kept);
-    patch.moves.push_back({kept, place.position.value_or(on_edge), {{ends[0], ends[1]}, {1 - t, t}}});
+    patch.moves.push_back({kept, place.position.value_or(on_edge)});
   }
   Collapser collapser(mesh, kept, gone, patch);
   absl::Status status;
   ForEachElement(star, [&](EntityId element) {
     if (status.ok()) status = collapser.Replace(element);
   });
+  patch.mergers.push_back({kept, gone, first_stays ? t : 1 - t});
   patch.removed_vertices.push_back(gone);
   patch.check_euler = true;
   return status.ok() ? TwinCheck(mesh, kept, gone).Check(patch) : status;

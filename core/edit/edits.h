@@ -34,7 +34,7 @@ struct AddAttributeEdit {
   AttributeSpec spec;
 };
 struct SetAttributeEdit {
-  AttributeSpec spec;  ///< must equal the column's
+  AttributeSpec spec;  ///< of the column; policy and default do not matter, and `type` is that of `rows`
   std::vector<Slot> slots;
   std::vector<uint8_t> rows;
 };

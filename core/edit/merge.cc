@@ -80,9 +80,7 @@ absl::Status PlanMergeVertices(const Mesh& mesh, VertexId kept, VertexId gone,
   DYNMESH_RETURN_IF_ERROR(CheckApart(mesh, kept, gone, star));
   if (position) {
     patch.work += WorkOfStar(mesh, kept);
-    Patch::Move& move = patch.moves.emplace_back();
-    move.vertex = kept;
-    move.position = *position;
+    patch.moves.push_back({kept, *position});
   }
   const TwinFinder twins(mesh, star);
   absl::Status status;
@@ -100,6 +98,7 @@ absl::Status PlanMergeVertices(const Mesh& mesh, VertexId kept, VertexId gone,
                     absl::StrCat(EntityKindName(id.kind), " ", id.slot, " would equal ", twin.slot), id.kind,
                     {id.slot, twin.slot});
   });
+  patch.mergers.push_back({kept, gone});
   patch.removed_vertices.push_back(gone);
   return status;
 }

@@ -12,7 +12,8 @@ namespace dynmesh {
 /// same vertices then are one: two meshes that touch grow together vertex by vertex. This is the one operator
 /// that is meant to change the topology.
 ///
-/// `position`: where the vertex is then; by default where `kept` is. Attributes are those of `kept`.
+/// `position`: where the vertex is then; by default where `kept` is. Attributes follow the policies
+/// of their columns, where `kept` has all the weight.
 /// Errors: FAILED_PRECONDITION EDGE_EXISTS with the edge that joins the two (collapse it), NOT_SIMPLEX with
 /// an element that has both, DUPLICATE_ELEMENT with an element that another one would equal,
 /// DEGENERATE_ELEMENT; INVALID_ARGUMENT BAD_ARGUMENT when both are the same. REQUIRES: both are live. Cost:

@@ -158,8 +158,10 @@ absl::Status OperatorRunner::RunOne(size_t item, const PatchLimits& limits, Plan
   DYNMESH_RETURN_IF_ERROR(ChargePlanned());
   DYNMESH_RETURN_IF_ERROR(planned);
   DYNMESH_RETURN_IF_ERROR(CheckPatch(mesh_, patch_, limits));
-  DYNMESH_RETURN_IF_ERROR(ApplyPatch(mesh_, patch_, applied_));
-  return ChargeAttributes();
+  const uint64_t room = options_.max_attribute_bytes - attribute_bytes_;
+  DYNMESH_RETURN_IF_ERROR(ApplyPatch(mesh_, patch_, applied_, room));
+  attribute_bytes_ += applied_.attribute_bytes;
+  return absl::OkStatus();
 }
 
 /// Counts what was planned, so that few items cannot take long or fill the memory.
@@ -169,12 +171,6 @@ absl::Status OperatorRunner::ChargePlanned() {
   if (work_ > options_.max_work) return LimitExceeded("max_batch_work", options_.max_work, work_);
   if (result_.num_made <= options_.max_made) return absl::OkStatus();
   return LimitExceeded("max_batch_items", options_.max_made, result_.num_made);
-}
-
-absl::Status OperatorRunner::ChargeAttributes() {
-  attribute_bytes_ += applied_.attribute_bytes;
-  if (attribute_bytes_ <= options_.max_attribute_bytes) return absl::OkStatus();
-  return LimitExceeded("max_session_bytes", options_.max_attribute_bytes, attribute_bytes_);
 }
 
 /// Vertices that were not made keep their places, so that later ones can be counted on.

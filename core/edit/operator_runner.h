@@ -43,7 +43,6 @@ class OperatorRunner {
   absl::Status RunAll(const Items& items, const PatchLimits& limits, Plan plan);
   absl::Status RunOne(size_t item, const PatchLimits& limits, Plan plan);
   absl::Status ChargePlanned();
-  absl::Status ChargeAttributes();
   void Skip(const Items& items, uint32_t index, absl::Status status);
   absl::Status Report(const Items& items);
   double DefaultParameter(EdgeId e, VertexId origin) const;

@@ -10,6 +10,8 @@ namespace dynmesh {
 void Patch::Clear() {
   new_vertices.clear();
   moves.clear();
+  mergers.clear();
+  cuts.clear();
   removed.clear();
   added.clear();
   parents.clear();

@@ -37,11 +37,23 @@ struct Patch {
   struct Move {
     VertexId vertex;
     Point position;
-    Blend blend;  ///< empty: its attributes stay
+  };
+  /// A vertex that becomes another one, in every element.
+  struct Merger {
+    VertexId kept, gone;
+    double weight = 0;  ///< of `gone` in the attributes of `kept`, from 0 to 1; `kept` itself has the rest
+  };
+  /// An edge that gets a vertex in the middle.
+  struct Cut {
+    VertexId a, b;
+    VertexId middle;
   };
 
   std::vector<NewVertex> new_vertices;
   std::vector<Move> moves;
+  std::vector<Merger>
+      mergers;            ///< attributes of vertices, and of the edges and faces there, follow from these
+  std::vector<Cut> cuts;  ///< and from these
   std::vector<EntityId> removed;
   std::vector<NewElement> added;
   std::vector<uint32_t> parents;  ///< of each added element: an index in `removed`

@@ -4,6 +4,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/edit/cone.h"
+#include "core/edit/polygon.h"
 #include "core/edit/star.h"
 #include "core/mesh/vector.h"
 
@@ -46,10 +47,9 @@ class EdgeSplitter {
   }
 
   void FanOfFace(absl::Span<const VertexId> vertices) {
-    for (size_t k = 0; k < vertices.size(); ++k) {
-      const VertexId ends[] = {vertices[k], vertices[(k + 1) % vertices.size()]};
-      if (!HasEdge(ends)) patch_.Add(ElementType::kTriangle, {ends[0], ends[1], middle_});
-    }
+    ForEachOtherSide(vertices, a_, b_, [this](VertexId from, VertexId to) {
+      patch_.Add(ElementType::kTriangle, {from, to, middle_});
+    });
   }
 
   const Mesh& mesh_;
@@ -77,6 +77,7 @@ absl::Status PlanSplitEdge(const Mesh& mesh, EdgeId e, const SplitPlace& place, 
   const double t = place.parameter;
   const Point on_edge = (1 - t) * mesh.Position(a) + t * mesh.Position(b);
   const VertexId middle = patch.AddVertex(place.position.value_or(on_edge), {{a, b}, {1 - t, t}});
+  patch.cuts.push_back({a, b, middle});
   ForEachElement(star, EdgeSplitter(mesh, a, b, middle, patch));
   return absl::OkStatus();
 }

@@ -8,6 +8,7 @@
 #include "absl/strings/str_cat.h"
 #include "core/edit/bad_argument.h"
 #include "core/edit/batch_names.h"
+#include "core/edit/convert_rows.h"
 #include "core/edit/operator_runner.h"
 #include "core/mesh/spatial_order.h"
 #include "core/mesh/validate.h"
@@ -92,16 +93,14 @@ class BatchApplier {
   absl::Status operator()(const SetAttributeEdit& edit) {
     if (!IsEntityKind(edit.spec.kind)) return BadKind(edit.spec.kind);
     const int column = mesh_.FindAttribute(edit.spec.name, edit.spec.kind);
-    if (column < 0 || mesh_.attributes()[column].spec() != edit.spec) return UnknownAttribute(edit.spec);
-    const size_t row_bytes = edit.spec.row_bytes();
-    if (edit.rows.size() != edit.slots.size() * row_bytes) {
-      return BadLength("bytes of attribute rows", edit.slots.size() * row_bytes, edit.rows.size());
-    }
-    return ForEach(edit.slots.size(), [&](size_t i) -> absl::Status {
-      DYNMESH_ASSIGN_OR_RETURN(const EntityId id, names_.Entity(edit.spec.kind, edit.slots[i]));
-      return mesh_.SetAttribute(column, id.slot,
-                                absl::MakeConstSpan(edit.rows).subspan(i * row_bytes, row_bytes));
-    });
+    const bool fits = column >= 0 && mesh_.attributes()[column].spec().components == edit.spec.components;
+    if (!fits || ScalarBytes(edit.spec.type) == 0) return UnknownAttribute(edit.spec);
+    const size_t bytes = edit.slots.size() * edit.spec.row_bytes();
+    if (edit.rows.size() != bytes) return BadLength("bytes of attribute rows", bytes, edit.rows.size());
+    const AttributeSpec spec = mesh_.attributes()[column].spec();
+    if (spec.type == edit.spec.type) return SetRows(column, edit.slots, edit.rows);
+    DYNMESH_ASSIGN_OR_RETURN(const std::vector<uint8_t> rows, ConvertRows(edit.rows, edit.spec.type, spec));
+    return SetRows(column, edit.slots, rows);
   }
 
   /// Operators have a runner of their own.
@@ -147,6 +146,15 @@ class BatchApplier {
     return absl::OkStatus();
   }
 
+  absl::Status SetRows(int column, absl::Span<const Slot> slots, absl::Span<const uint8_t> rows) {
+    const EntityKind kind = mesh_.attributes()[column].spec().kind;
+    const size_t row_bytes = mesh_.attributes()[column].spec().row_bytes();
+    return ForEach(slots.size(), [&](size_t i) -> absl::Status {
+      DYNMESH_ASSIGN_OR_RETURN(const EntityId id, names_.Entity(kind, slots[i]));
+      return mesh_.SetAttribute(column, id.slot, rows.subspan(i * row_bytes, row_bytes));
+    });
+  }
+
   /// Hilbert order, or none when a position is not finite and so will be refused.
   static Permutation FiniteOrder(absl::Span<const Point> positions) {
     const bool finite = std::all_of(positions.begin(), positions.end(), IsFinite);
@@ -156,7 +164,7 @@ class BatchApplier {
   static absl::Status UnknownAttribute(const AttributeSpec& spec) {
     return MakeError(absl::StatusCode::kNotFound, reason::kUnknownAttribute,
                      absl::StrCat("no ", EntityKindName(spec.kind), " attribute '", spec.name,
-                                  "' of this type and number of components"),
+                                  "' of ", spec.components, " components"),
                      {{"attribute", spec.name}});
   }
 

@@ -2,67 +2,18 @@
 
 #include <algorithm>
 #include <cassert>
-#include <cmath>
-#include <cstring>
-
-#include "absl/strings/ascii.h"
-#include "absl/strings/str_cat.h"
-#include "core/mesh/error.h"
 
 namespace dynmesh {
-namespace {
-
-bool IsNameByte(char c) { return absl::ascii_isalnum(c) || c == '_' || c == '.' || c == '-'; }
-
-bool IsName(absl::string_view name) {
-  return !name.empty() && name.size() <= kMaxAttributeNameBytes &&
-         std::all_of(name.begin(), name.end(), IsNameByte);
-}
-
-bool IsFiniteAt(absl::Span<const uint8_t> values, size_t offset) {
-  double value;
-  std::memcpy(&value, values.data() + offset, sizeof(value));
-  return std::isfinite(value);
-}
-
-absl::Status BadSpec(const AttributeSpec& spec, absl::string_view message) {
-  return InvalidArgument(reason::kBadArgument, message, {{"attribute", spec.name}});
-}
-
-}  // namespace
-
-absl::Status CheckAttributeSpec(const AttributeSpec& spec) {
-  if (!IsName(spec.name)) {
-    return InvalidArgument(reason::kBadArgument, "an attribute's name is 1-64 bytes of [A-Za-z0-9_.-]");
-  }
-  if (static_cast<int>(spec.kind) >= kNumEntityKinds) {
-    return BadSpec(spec, "an attribute is of an entity kind");
-  }
-  if (ScalarBytes(spec.type) == 0) return BadSpec(spec, "an attribute is of type float64 or int32");
-  if (spec.components < 1 || spec.components > kMaxAttributeComponents) {
-    return BadSpec(spec, absl::StrCat("an attribute has 1-16 components, not ", spec.components));
-  }
-  return absl::OkStatus();
-}
-
-absl::Status CheckFinite(const AttributeSpec& spec, absl::Span<const uint8_t> values) {
-  if (spec.type != AttributeType::kFloat64) return absl::OkStatus();
-  assert(values.size() % spec.row_bytes() == 0);
-  for (size_t offset = 0; offset < values.size(); offset += sizeof(double)) {
-    if (IsFiniteAt(values, offset)) continue;
-    const std::string row = absl::StrCat(offset / spec.row_bytes());
-    return InvalidArgument(reason::kNonFinite,
-                           absl::StrCat("row ", row, " of attribute ", spec.name, " is not finite"),
-                           {{"attribute", spec.name}, {"index", row}});
-  }
-  return absl::OkStatus();
+AttributeColumn::AttributeColumn(AttributeSpec spec, Stamp born)
+    : spec_(std::move(spec)), born_(born), default_row_(spec_.default_row) {
+  default_row_.resize(spec_.row_bytes());
 }
 
 absl::Span<const uint8_t> AttributeColumn::Row(Slot slot) const {
   const size_t page = slot / StampColumn::kPageSlots;
-  if (page >= pages_.size() || pages_[page].empty()) return zeros_;
+  if (page >= pages_.size() || pages_[page].empty()) return default_row_;
   return absl::MakeConstSpan(pages_[page])
-      .subspan(slot % StampColumn::kPageSlots * zeros_.size(), zeros_.size());
+      .subspan(slot % StampColumn::kPageSlots * default_row_.size(), default_row_.size());
 }
 
 void AttributeColumn::SetRow(Slot slot, absl::Span<const uint8_t> row, Stamp stamp) {
@@ -94,15 +45,24 @@ size_t AttributeColumn::BytesToSet(absl::Span<const Slot> slots) const {
   const size_t stamps =
       (size_t{end} + StampColumn::kPageSlots - 1) / StampColumn::kPageSlots * StampColumn::kPageSlots;
   const size_t new_stamps = stamps > stamps_.size() ? stamps - stamps_.size() : 0;
-  return num_missing * StampColumn::kPageSlots * zeros_.size() + new_stamps * sizeof(Stamp);
+  return num_missing * StampColumn::kPageSlots * default_row_.size() + new_stamps * sizeof(Stamp);
 }
 
 void AttributeColumn::CopyRow(Slot slot, absl::Span<const uint8_t> row) {
-  assert(row.size() == zeros_.size());
+  assert(row.size() == default_row_.size());
   const size_t page = slot / StampColumn::kPageSlots;
   if (page >= pages_.size()) pages_.resize(page + 1);
-  if (pages_[page].empty()) pages_[page].resize(StampColumn::kPageSlots * row.size());
+  if (pages_[page].empty()) pages_[page] = PageOfDefaults();
   std::copy(row.begin(), row.end(), pages_[page].begin() + slot % StampColumn::kPageSlots * row.size());
+}
+
+std::vector<uint8_t> AttributeColumn::PageOfDefaults() const {
+  std::vector<uint8_t> page(StampColumn::kPageSlots * default_row_.size());
+  if (spec_.has_zero_default()) return page;
+  for (size_t offset = 0; offset < page.size(); offset += default_row_.size()) {
+    std::copy(default_row_.begin(), default_row_.end(), page.begin() + offset);
+  }
+  return page;
 }
 
 }  // namespace dynmesh

@@ -26,6 +26,7 @@ inline constexpr char kNotAnElement[] = "NOT_AN_ELEMENT";   // derived entity wh
 inline constexpr char kVertexInUse[] = "VERTEX_IN_USE";     // vertex still has incident edges
 inline constexpr char kDuplicateElement[] = "DUPLICATE_ELEMENT";
 inline constexpr char kNonFinite[] = "NON_FINITE_VALUE";  // NaN or infinite
+inline constexpr char kInexactValue[] = "INEXACT_VALUE";  // the column's type cannot hold it
 inline constexpr char kBadArrayLength[] = "BAD_ARRAY_LENGTH";
 inline constexpr char kBadElementType[] = "BAD_ELEMENT_TYPE";
 inline constexpr char kBadEntityKind[] = "BAD_ENTITY_KIND";

@@ -170,12 +170,11 @@ void Mesh::WriteAttribute(int column, Slot slot, absl::Span<const uint8_t> row) 
   values.SetRow(slot, row, next_stamp());
 }
 
-void Mesh::ZeroAttributes(EntityId id) {
+void Mesh::ResetAttributes(EntityId id) {
   for (size_t column = 0; column < attributes_.size(); ++column) {
     if (attributes_[column].spec().kind != id.kind) continue;
-    const auto row = attributes_[column].Row(id.slot);
-    if (std::all_of(row.begin(), row.end(), [](uint8_t byte) { return byte == 0; })) continue;
-    WriteAttribute(column, id.slot, std::vector<uint8_t>(row.size()));
+    const auto row = attributes_[column].default_row();
+    if (attributes_[column].Row(id.slot) != row) WriteAttribute(column, id.slot, row);
   }
 }
 

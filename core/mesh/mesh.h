@@ -256,7 +256,8 @@ class Mesh {
   const std::vector<AttributeColumn>& attributes() const { return attributes_; }
   /// Index into attributes(), or -1.
   int FindAttribute(absl::string_view name, EntityKind kind) const;
-  /// Adds a column of zeros. Errors: INVALID_ARGUMENT; ALREADY_EXISTS ATTRIBUTE_EXISTS; RESOURCE_EXHAUSTED.
+  /// Adds a column of default rows. Errors: those of CheckAttributeSpec; ALREADY_EXISTS ATTRIBUTE_EXISTS;
+  /// RESOURCE_EXHAUSTED.
   absl::Status AddAttribute(const AttributeSpec& spec);
   /// Sets the row of a live entity. Errors: INVALID_ARGUMENT BAD_ARRAY_LENGTH, NON_FINITE_VALUE.
   /// REQUIRES: 0 <= column < attributes().size().
@@ -436,7 +437,7 @@ class Mesh {
 
   uint64_t ElementTerm(EntityId id) const;
   void Touch(EntityId id) { changed_[Dimension(id.kind)].Touch(id.slot, next_stamp()); }
-  void ZeroAttributes(EntityId id);
+  void ResetAttributes(EntityId id);
   void WriteAttribute(int column, Slot slot, absl::Span<const uint8_t> row);
 
   // mesh_storage.cc: rows by slot

@@ -58,7 +58,7 @@ CellId Mesh::CreateCell(ElementType type, VertexSpan vertices, absl::Span<const 
 // ---- Destroy ----
 
 void Mesh::DestroyVertex(VertexId v) {
-  ZeroAttributes(v);
+  ResetAttributes(v);
   Record({JournalOp::kDestroy, EntityKind::kVertex, v.slot(), 0, changed(EntityKind::kVertex).At(v.slot())});
   checksum_.topology -= Checksum::VertexTerm(v.slot());
   checksum_.geometry -= Checksum::PositionTerm(v.slot(), Position(v));
@@ -67,7 +67,7 @@ void Mesh::DestroyVertex(VertexId v) {
 }
 
 void Mesh::DestroyEdge(EdgeId e) {
-  ZeroAttributes(e);
+  ResetAttributes(e);
   Record({JournalOp::kDestroy, EntityKind::kEdge, e.slot(), 0, 0});
   if (IsDuplicate(e)) CountDuplicate(e, -1);
   UnlinkEdge(e);
@@ -76,7 +76,7 @@ void Mesh::DestroyEdge(EdgeId e) {
 }
 
 void Mesh::DestroyFace(FaceId f) {
-  ZeroAttributes(f);
+  ResetAttributes(f);
   Record({JournalOp::kDestroy, EntityKind::kFace, f.slot(), 0, 0});
   if (IsDuplicate(f)) CountDuplicate(f, -1);
   UnlinkFace(f);
@@ -85,7 +85,7 @@ void Mesh::DestroyFace(FaceId f) {
 }
 
 void Mesh::DestroyCell(CellId c) {
-  ZeroAttributes(c);
+  ResetAttributes(c);
   Record({JournalOp::kDestroy, EntityKind::kCell, c.slot(), 0, changed(EntityKind::kCell).At(c.slot())});
   UnlinkCell(c);
   CountElement(c, -1);

@@ -410,7 +410,9 @@ class MeshValidator {
       const Slot limit = mesh_.slots(column.spec().kind).limit();
       bool sound = column.stamps().IsSound();
       column.stamps().ForEachSince(0, 0, column.stamps().size(), [&](Slot slot) {
-        sound = sound && slot < limit && column.stamps().At(slot) <= mesh_.revision() + 1;
+        const bool live = slot < limit && mesh_.IsLive({column.spec().kind, slot});
+        sound = sound && slot < limit && column.stamps().At(slot) <= mesh_.revision() + 1 &&
+                (live || column.Row(slot) == column.default_row());
       });
       if (!sound) Report("attribute ", column.spec().name, " has impossible rows or stamps");
     }

@@ -41,11 +41,13 @@ absl::StatusOr<AttributeSpec> ToAttributeSpec(const v1::AttributeSpec& message) 
   AttributeSpec spec;
   spec.name = message.name();
   DYNMESH_ASSIGN_OR_RETURN(spec.kind, ToEntityKind(message.kind(), "kind"));
-  spec.type = message.type() == v1::ATTRIBUTE_TYPE_FLOAT64 ? AttributeType::kFloat64
-              : message.type() == v1::ATTRIBUTE_TYPE_INT32 ? AttributeType::kInt32
-                                                           : AttributeType::kUnspecified;
+  // What does not fit the fields becomes what CheckAttributeSpec refuses.
+  const int type = message.type(), policy = message.policy();
+  spec.type = IsAttributeType(type) ? static_cast<AttributeType>(type) : AttributeType::kUnspecified;
+  spec.policy = static_cast<AttributePolicy>(IsAttributePolicy(policy) ? policy : UINT8_MAX);
   const uint32_t components = message.components() == 0 ? 1 : message.components();
   spec.components = std::min<uint32_t>(components, kMaxAttributeComponents + 1);
+  spec.default_row.assign(message.default_row().begin(), message.default_row().end());
   DYNMESH_RETURN_IF_ERROR(CheckAttributeSpec(spec));
   return spec;
 }
@@ -56,6 +58,8 @@ v1::AttributeSpec FromAttributeSpec(const AttributeSpec& spec) {
   message.set_kind(FromEntityKind(spec.kind));
   message.set_type(static_cast<v1::AttributeType>(spec.type));
   message.set_components(spec.components);
+  message.set_policy(static_cast<v1::AttributePolicy>(spec.effective_policy()));
+  if (!spec.has_zero_default()) message.set_default_row(FromArray(spec.default_row));
   return message;
 }
 

@@ -51,7 +51,7 @@ v1::EntityKind FromEntityKind(EntityKind kind);
 absl::StatusOr<ElementType> ToElementType(int type);
 v1::ElementType FromElementType(ElementType type);
 
-/// Errors: BAD_ENTITY_KIND, BAD_ARGUMENT.
+/// Errors: BAD_ENTITY_KIND, BAD_ARGUMENT, BAD_ARRAY_LENGTH, NON_FINITE_VALUE.
 absl::StatusOr<AttributeSpec> ToAttributeSpec(const v1::AttributeSpec& spec);
 v1::AttributeSpec FromAttributeSpec(const AttributeSpec& spec);
 

@@ -87,7 +87,7 @@ class Exporter {
     });
   }
 
-  /// All rows but the zeros of derived entities that nobody set.
+  /// All rows but the defaults of derived entities that nobody set.
   bool Travels(const AttributeColumn& column, Slot slot) const {
     const EntityKind kind = column.spec().kind;
     return kind == EntityKind::kVertex || mesh_.IsElement({kind, slot}) || column.stamps().At(slot) != 0;

@@ -92,6 +92,8 @@ void Fingerprint::AddSpec(const AttributeSpec& spec) {
   AddNumber(Dimension(spec.kind));
   AddNumber(static_cast<uint64_t>(spec.type));
   AddNumber(spec.components);
+  AddNumber(static_cast<uint64_t>(spec.effective_policy()));
+  AddArray(spec.default_row);
 }
 
 void Fingerprint::AddEdit(const Edit& edit) {

@@ -8,25 +8,24 @@ from dynmesh.columns import as_values
 from shapes import TET, two_tets
 
 
+COLUMN_DTYPES = [np.float64, np.float32, np.int64, np.int32, np.uint8]
+
+
 @pytest.mark.parametrize(
-    "dtype", [np.bool_, np.int8, np.uint8, np.int16, np.uint16, np.int32, np.int64, np.uint64]
+    ("given", "kept"),
+    [(dtype, dtype) for dtype in COLUMN_DTYPES]
+    + [(np.float16, np.float32), (np.bool_, np.uint8), (np.int8, np.int32), (np.int16, np.int32)]
+    + [(np.uint16, np.int32), (np.uint32, np.int64), (np.uint64, np.int64)],
 )
-def test_integers_that_fit_become_int32(dtype):
-    values = as_values(np.array([0, 1], dtype=dtype), "a")
-    assert values.dtype == np.int32 and values.tolist() == [[0], [1]]
-
-
-@pytest.mark.parametrize("dtype", [np.float16, np.float32, np.float64])
-def test_floats_become_float64_exactly(dtype):
-    given = np.array([[0.1, -0.0], [1e-5, 3]], dtype=dtype)
-    assert (as_values(given, "a") == given).all()
+def test_values_keep_their_type_or_get_the_nearest_that_holds_them(given, kept):
+    given = np.array([[0, 1], [1, 0]], dtype=given)
+    values = as_values(given, "a")
+    assert values.dtype == kept and (values == given).all()
 
 
 @pytest.mark.parametrize(
     "values",
     [
-        [2**31],
-        [-(2**31) - 1],
         np.array([2**63], np.uint64),
         ["a"],
         [1j],
@@ -43,6 +42,96 @@ def test_what_would_change_is_refused_by_the_name_of_the_column(values):
     assert caught.value.metadata == {"attribute": "stress"}
 
 
+@pytest.mark.parametrize("dtype", COLUMN_DTYPES)
+def test_columns_of_each_type_travel_to_files_and_mirrors_as_they_are(session, dtype):
+    mesh = two_tets()
+    mesh.point_data = {"t": np.array([[0, 1], [2, 3], [4, 5], [6, 7], [8, 100]], dtype)}
+    session.import_mesh(mesh)
+    assert session.info().attributes[0].dtype == np.dtype(dtype).name
+    with session.mirror() as mirror:
+        mirror.wait(1, timeout=20)
+        for copy in (session.to_meshio(), mirror.to_meshio()):
+            assert copy.point_data["t"].dtype == dtype
+            assert (copy.point_data["t"] == mesh.point_data["t"]).all()
+
+
+@pytest.mark.parametrize("codec", ["auto", "raw"])
+def test_a_default_is_the_row_of_whoever_has_none(session, codec):
+    session.import_mesh(TET, {"tetra": [[0, 1, 2, 3]], "line": [[0, 1]]})
+    with session.mirror(codec=codec) as early:
+        with session.edit() as tx:
+            tx.add_attribute("t", "vertex", np.float32, 2, default=[0.5, -1], policy="max")
+            tx.add_attribute("q", "edge", np.int64, default=-7)
+            tx.set_attribute("t", "vertex", [3], [[1, 2]])
+        with session.edit() as tx:
+            tx.remove_elements("cell", [0])
+            tx.remove_vertices([3])
+        with session.edit() as tx:
+            tx.add_vertices([[0, 0, 2], [0, 0, 3]])
+        with session.edit() as tx:
+            tx.set_attribute("t", "vertex", [4], [[3, 4]])
+        early.wait(5, timeout=20)
+        with session.mirror(codec=codec) as late:
+            late.wait(5, timeout=20)
+            for mirror in (early, late):
+                assert mirror.attribute("t", "vertex").tolist() == 4 * [[0.5, -1]] + [[3, 4]]
+                assert mirror.attribute("q", "edge").size == 0
+                assert mirror.to_meshio().cell_data["q"][0].tolist() == [-7]
+    assert session.to_meshio().point_data["t"].tolist() == 4 * [[0.5, -1]] + [[3, 4]]
+    assert session.info().attributes == (
+        ("t", dynmesh.EntityKind.VERTEX, "float32", 2, "max", (0.5, -1.0)),
+        ("q", dynmesh.EntityKind.EDGE, "int64", 1, "copy", (-7,)),
+    )
+
+
+@pytest.mark.parametrize(("policy", "middle"), [("interpolate", 15), ("copy", 10), ("max", 20), ("drop", 3)])
+def test_policies_say_what_a_new_vertex_takes(session, policy, middle):
+    session.import_mesh(TET, {"tetra": [[0, 1, 2, 3]]})
+    with session.edit() as tx:
+        tx.add_attribute("t", "vertex", np.uint8, default=3, policy=policy)
+        tx.set_attribute("t", "vertex", [0, 1], [10, 20])
+        tx.split_edges(ends=[[0, 1]])
+    assert session.to_meshio().point_data["t"].tolist() == [10, 20, 3, 3, middle]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "field"),
+    [
+        ({"dtype": np.int16}, "type"),
+        ({"policy": "mean"}, "policy"),
+        ({"default": [1, 2]}, "default_row"),
+        ({"default": 0.1, "dtype": np.float32}, "default_row"),
+        ({"default": 256, "dtype": np.uint8}, "default_row"),
+        ({"default": 2.5, "dtype": np.int64}, "default_row"),
+        ({"default": 2**63, "dtype": np.int64}, "default_row"),
+        ({"default": "a"}, "default_row"),
+    ],
+)
+def test_a_column_that_cannot_be_is_refused_by_its_field(session, arguments, field):
+    with pytest.raises(dynmesh.InvalidArgumentError, match="'t'") as caught, session.edit() as tx:
+        tx.add_attribute("t", "vertex", **arguments)
+    assert caught.value.metadata == {"attribute": "t", "field": field}
+    assert session.info().revision == 0
+
+
+def test_a_default_that_is_not_finite_is_refused(session):
+    with pytest.raises(dynmesh.InvalidArgumentError, match="NON_FINITE_VALUE"), session.edit() as tx:
+        tx.add_attribute("t", "vertex", default=np.inf)
+    assert session.info().attributes == ()
+
+
+def test_values_of_another_type_are_taken_only_as_what_they_are(session):
+    session.import_mesh(TET, {})
+    with session.edit() as tx:
+        tx.add_attribute("t", "vertex", np.float32)
+        tx.set_attribute("t", "vertex", [0, 1], np.array([7, 8]))
+        tx.set_attribute("t", "vertex", [2], np.float32([0.1]))
+    assert session.to_meshio().point_data["t"].tolist() == [7, 8, np.float32(0.1), 0]
+    with pytest.raises(dynmesh.InvalidArgumentError, match="INEXACT_VALUE"), session.edit() as tx:
+        tx.set_attribute("t", "vertex", [0, 3], [0.5, 0.1])
+    assert session.to_meshio().point_data["t"].tolist() == [7, 8, np.float32(0.1), 0]
+
+
 def test_data_of_a_mesh_comes_back(session):
     mesh = two_tets()
     mesh.point_data = {"t": np.linspace(0, 1, 5), "v": np.arange(15, dtype=float).reshape(5, 3)}
@@ -56,7 +145,7 @@ def test_data_of_a_mesh_comes_back(session):
 
 def test_only_the_attributes_that_were_named_are_taken(session):
     mesh = two_tets()
-    mesh.point_data = {"good": np.zeros(5), "bad": np.full(5, 2**40)}
+    mesh.point_data = {"good": np.zeros(5), "bad": np.full(5, 2**63, np.uint64)}
     session.import_mesh(mesh, attributes=["good"])
     assert [spec.name for spec in session.info().attributes] == ["good"]
 
@@ -66,7 +155,19 @@ def test_a_name_that_the_server_cannot_have_is_changed_with_a_warning(session):
     mesh.cell_data = {"gmsh:physical": [np.array([1, 2])]}
     with pytest.warns(UserWarning, match="gmsh_physical"):
         session.import_mesh(mesh)
-    assert session.info().attributes == (("gmsh_physical", dynmesh.EntityKind.CELL, "int32", 1),)
+    assert session.info().attributes == (
+        ("gmsh_physical", dynmesh.EntityKind.CELL, "int64", 1, "copy", (0,)),
+    )
+
+
+def test_blocks_of_one_column_get_a_type_that_holds_all_of_them(session):
+    mesh = meshio.Mesh(TET, [("tetra", [[0, 1, 2, 3]]), ("tetra", [[0, 2, 1, 3]])])
+    mesh.cell_data = {"a": [np.array([2**53]), np.array([0.5])]}
+    session.import_mesh(mesh)
+    assert session.to_meshio().cell_data["a"][0].tolist() == [2.0**53, 0.5]
+    mesh.cell_data = {"a": [np.array([2**53 + 1]), np.array([0.5])]}
+    with pytest.raises(dynmesh.InvalidArgumentError, match="'a'"):
+        session.import_mesh(mesh)
 
 
 def test_two_columns_that_would_share_a_name_are_refused(session):

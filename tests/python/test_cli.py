@@ -131,7 +131,7 @@ def test_a_file_that_cannot_be_read_makes_no_session(run, tmp_path):
 
 def test_a_mesh_that_is_refused_makes_no_session(run, tmp_path):
     mesh = two_tets()
-    mesh.point_data = {"big": np.full(5, 2**40)}
+    mesh.point_data = {"big": np.full(5, 2**63, np.uint64)}
     meshio.write(tmp_path / "big.vtu", mesh)
     created = run("create", "refused", tmp_path / "big.vtu")
     assert created.returncode == 1 and "'big'" in created.stderr

@@ -333,8 +333,9 @@ def assert_same(one, other):
         assert one == other
 
 
+@pytest.mark.parametrize("newest", [False, True])
 @pytest.mark.parametrize("position_bits", [0, 12])
-def test_raw_deltas_are_decoded_alike_in_numpy(session, position_bits):
+def test_raw_deltas_are_decoded_alike_in_numpy(session, position_bits, newest):
     session.import_mesh(zoo())
     with session.edit() as tx:
         tx.remove_elements("cell", [0])
@@ -344,7 +345,12 @@ def test_raw_deltas_are_decoded_alike_in_numpy(session, position_bits):
             tx.add_attribute("u", kind, np.float64)
             tx.set_attribute("t", kind, [1], [[-5, 7]])
             tx.set_attribute("u", kind, [2, 3], [0.25, -1e300])
+        if newest:  # columns that only version 2 of the format can describe
+            for number, dtype in enumerate((np.float32, np.int64, np.uint8)):
+                tx.add_attribute(f"v{number}", "vertex", dtype, 3, default=[1, 2, 3], policy="drop")
+                tx.set_attribute(f"v{number}", "vertex", [1, 5], [[7, 8, 9], [0, 0, 255]])
     payload = payload_of(session, subscriptions_pb2.DELTA_CODEC_RAW, position_bits)
+    assert payload[4] == (2 if newest else 1)
     assert_same(native.decode(payload), decode_raw(payload))
 
 
@@ -365,6 +371,9 @@ def test_it_follows_without_the_native_module(session, monkeypatch):
 @pytest.mark.parametrize("decode", [decode_delta, decode_raw])
 def test_damaged_payloads_are_typed_errors_and_nothing_worse(session, decode):
     session.import_mesh(zoo())
+    with session.edit() as tx:
+        tx.add_attribute("t", "vertex", np.float32, 2, default=[1, 2])
+        tx.set_attribute("t", "vertex", [1, 5], [[7, 8], [0, 255]])
     payload = payload_of(session, subscriptions_pb2.DELTA_CODEC_RAW)
     rng = np.random.default_rng(5)
     for _ in range(500):

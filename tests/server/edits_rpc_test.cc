@@ -160,9 +160,36 @@ std::vector<RefusalCase> RefusalCases() {
       {"attribute type",
        [](R* r) {
          *r->add_edits()->mutable_add_attribute() =
-             Spec("a", v1::ENTITY_KIND_VERTEX, static_cast<v1::AttributeType>(3), 1);
+             Spec("a", v1::ENTITY_KIND_VERTEX, static_cast<v1::AttributeType>(257), 1);
        },
-       grpc::INVALID_ARGUMENT, reason::kBadArgument, "edit", "0"},
+       grpc::INVALID_ARGUMENT, reason::kBadArgument, "field", "type"},
+      {"attribute policy",
+       [=](R* r) {
+         *r->add_edits()->mutable_add_attribute() = attribute("a");
+         r->mutable_edits(0)->mutable_add_attribute()->set_policy(static_cast<v1::AttributePolicy>(257));
+       },
+       grpc::INVALID_ARGUMENT, reason::kBadArgument, "field", "policy"},
+      {"attribute default of another length",
+       [=](R* r) {
+         *r->add_edits()->mutable_add_attribute() = attribute("a", 2);
+         r->mutable_edits(0)->mutable_add_attribute()->set_default_row(Bytes<double>({1}));
+       },
+       grpc::INVALID_ARGUMENT, reason::kBadArrayLength, "field", "default_row"},
+      {"attribute default not finite",
+       [=](R* r) {
+         *r->add_edits()->mutable_add_attribute() = attribute("a");
+         r->mutable_edits(0)->mutable_add_attribute()->set_default_row(
+             Bytes<double>({std::numeric_limits<double>::quiet_NaN()}));
+       },
+       grpc::INVALID_ARGUMENT, reason::kNonFinite, "field", "default_row"},
+      {"attribute value of another type",
+       [](R* r) {
+         v1::AttributeValues* values = r->add_edits()->mutable_set_attribute();
+         *values->mutable_spec() = Spec("t", v1::ENTITY_KIND_VERTEX, v1::ATTRIBUTE_TYPE_INT64, 1);
+         values->set_ids(Bytes<Slot>({0, 1}));
+         values->set_values(Bytes<int64_t>({1, (int64_t{1} << 53) + 1}));
+       },
+       grpc::INVALID_ARGUMENT, reason::kInexactValue, "index", "1"},
       {"attribute exists", [=](R* r) { *r->add_edits()->mutable_add_attribute() = attribute("t"); },
        grpc::ALREADY_EXISTS, reason::kAttributeExists, "attribute", "t"},
       {"attribute unknown",

@@ -96,6 +96,23 @@ TEST_F(ImportRpcTest, AttributesTravelBothWays) {
   EXPECT_THAT(Array<int32_t>(chunks[2].attribute().values()), ElementsAre(1, 2, 3, 4));
 }
 
+TEST_F(ImportRpcTest, DefaultsAndPoliciesTravelBothWays) {
+  v1::ImportMeshRequest rows;
+  v1::AttributeSpec* spec = rows.mutable_attribute()->mutable_spec();
+  *spec = Spec("t", v1::ENTITY_KIND_CELL, v1::ATTRIBUTE_TYPE_UINT8, 3);
+  spec->set_default_row(Bytes<uint8_t>({9, 8, 7}));
+  spec->set_policy(v1::ATTRIBUTE_POLICY_MAX);
+  rows.mutable_attribute()->set_values(Bytes<uint8_t>({1, 2, 3}));
+  ASSERT_TRUE(ImportRequests({ImportHead("mesh", 4, 1), ImportPositions(SomePoints(4)), rows,
+                              ImportElements(v1::ELEMENT_TYPE_TETRAHEDRON, {0, 1, 2, 3})})
+                  .ok());
+  EXPECT_EQ(GetSession("mesh").attributes(0).SerializeAsString(), spec->SerializeAsString());
+  const auto chunks = Export("mesh");
+  ASSERT_EQ(chunks.size(), 3u);
+  EXPECT_EQ(chunks[2].attribute().spec().SerializeAsString(), spec->SerializeAsString());
+  EXPECT_EQ(chunks[2].attribute().values(), Bytes<uint8_t>({1, 2, 3}));
+}
+
 TEST_F(ImportRpcTest, HilbertOrderIsToldBeforeTheResultInPieces) {
   const Mesh mesh = TetGrid(40, 40, 40);  // more cells than one message has room for ids
   v1::ImportMeshRequest head = ImportHead("mesh");

@@ -6,6 +6,7 @@
 #include "tests/session/session_support.h"
 #include "tests/support/meshes.h"
 #include "tests/support/oracle.h"
+#include "tests/support/rows.h"
 
 namespace dynmesh::testing {
 namespace {
@@ -20,6 +21,7 @@ void ExpectEqual(RecordingSink& sink, Session& session) {
                       EXPECT_EQ(mirror.revision(), view.mesh.revision());
                       EXPECT_EQ(mirror.checksum(), view.mesh.checksum());
                       EXPECT_TRUE(ModelOf(mirror) == ModelOf(view.mesh));
+                      ExpectSameRows(mirror.attributes(), view.mesh);
                       return absl::OkStatus();
                     })
                     .ok());

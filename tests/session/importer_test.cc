@@ -166,6 +166,12 @@ TEST_F(ImporterTest, HostilePiecesAreRefusedByIndex) {
     other.components = 2;
     return s.AddRows(other, std::string(16, 0));
   });
+  expect(reason::kBadArgument, "", [](StagedMesh& s) {
+    EXPECT_TRUE(s.AddRows(kTemperature, std::string(8, 0)).ok());
+    AttributeSpec other = kTemperature;
+    other.policy = AttributePolicy::kDrop;
+    return s.AddRows(other, std::string(8, 0));
+  });
 }
 
 TEST_F(ImporterTest, HostileWholesAreRefusedByIndex) {

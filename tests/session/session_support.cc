@@ -18,7 +18,8 @@ extern "C" const char* __tsan_default_suppressions() { return "race:absl::*::Sta
 namespace dynmesh::testing {
 namespace {
 
-const AttributeSpec kQuality{"quality", EntityKind::kVertex, AttributeType::kFloat64, 2};
+const AttributeSpec kQuality{"quality", EntityKind::kVertex,   AttributeType::kFloat64,
+                             2,         AttributePolicy::kMax, std::vector<uint8_t>(16, 1)};
 
 template <typename Fn>
 void ForEachElement(const Mesh& mesh, Fn fn) {

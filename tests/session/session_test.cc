@@ -265,6 +265,8 @@ TEST(FingerprintTest, TellsEditsApart) {
       {RemoveElementsEdit{EntityKind::kFace, {1, 2}}},
       {RemoveElementsEdit{EntityKind::kCell, {1, 2}}},
       {AddAttributeEdit{spec}},
+      {AddAttributeEdit{{"a", EntityKind::kVertex, AttributeType::kInt32, 1, AttributePolicy::kMax}}},
+      {AddAttributeEdit{{"a", EntityKind::kVertex, AttributeType::kInt32, 1, AttributePolicy::kCopy, {1, 0, 0, 0}}}},
       {SetAttributeEdit{spec, {1}, {0, 0, 0, 1}}},
   };
   for (size_t i = 0; i < all.size(); ++i) {

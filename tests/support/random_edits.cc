@@ -83,17 +83,27 @@ void RandomEditor::RemoveElement() {
 
 void RandomEditor::SetAttribute() {
   if (mesh_.attributes().empty() || Uniform(20) == 0) {
-    const EntityKind kind = kEntityKinds[Uniform(kNumEntityKinds)];
-    const std::string name = "a" + std::to_string(mesh_.attributes().size());
-    EXPECT_TRUE(mesh_.AddAttribute({name, kind, AttributeType::kInt32, 2}).ok());
+    AttributeSpec spec;
+    spec.name = "a" + std::to_string(mesh_.attributes().size());
+    spec.kind = kEntityKinds[Uniform(kNumEntityKinds)];
+    spec.type = static_cast<AttributeType>(1 + Uniform(5));
+    spec.components = 1 + Uniform(3);
+    spec.policy = static_cast<AttributePolicy>(Uniform(5));
+    if (Uniform(2) == 0) spec.default_row = AnyRow(spec);
+    EXPECT_TRUE(mesh_.AddAttribute(spec).ok());
   }
   const int column = Uniform(mesh_.attributes().size());
-  const EntityKind kind = mesh_.attributes()[column].spec().kind;
-  const Slot slot = mesh_.slots(kind).live().Next(Uniform(20));
+  const AttributeSpec& spec = mesh_.attributes()[column].spec();
+  const Slot slot = mesh_.slots(spec.kind).live().Next(Uniform(20));
   if (slot == kNoSlot) return;
-  std::vector<uint8_t> row(8);
-  for (uint8_t& byte : row) byte = Uniform(256);
-  EXPECT_TRUE(mesh_.SetAttribute(column, slot, row).ok());
+  EXPECT_TRUE(mesh_.SetAttribute(column, slot, AnyRow(spec)).ok());
+}
+
+/// Bytes whose floating-point numbers are finite: no exponent has all bits.
+std::vector<uint8_t> RandomEditor::AnyRow(const AttributeSpec& spec) {
+  std::vector<uint8_t> row(spec.row_bytes());
+  for (uint8_t& byte : row) byte = Uniform(IsFloatingPoint(spec.type) ? 0x7f : 256);
+  return row;
 }
 
 VertexId RandomEditor::AnyVertex() { return std::next(model_.vertices.begin(), Uniform(model_.vertices.size()))->first; }

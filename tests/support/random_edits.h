@@ -36,6 +36,7 @@ class RandomEditor {
   void AddDuplicate();
   void RemoveElement();
   void SetAttribute();
+  std::vector<uint8_t> AnyRow(const AttributeSpec& spec);
   VertexId AnyVertex();
   Point AnyPoint();
   void Put(ElementType type, const std::vector<VertexId>& vertices);

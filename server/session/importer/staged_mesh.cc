@@ -176,7 +176,7 @@ absl::Status StagedMesh::ColumnFor(const AttributeSpec& spec, StagedColumn** col
     if (known.spec.name != spec.name || known.spec.kind != spec.kind) continue;
     if (known.spec != spec) {
       return InvalidArgument(reason::kBadArgument,
-                             absl::StrCat("attribute ", spec.name, " changes its type or components"),
+                             absl::StrCat("attribute ", spec.name, " is described otherwise than before"),
                              {{"attribute", spec.name}});
     }
     *column = &known;

@@ -82,6 +82,10 @@ TEST(CheckDeltaTest, ColumnsMustBePossible) {
   ExpectBroken([](Delta& d) { d.attributes[0].spec.components = 17; });
   ExpectBroken([](Delta& d) { d.attributes[0].spec.type = AttributeType::kUnspecified; });
   ExpectBroken([](Delta& d) { d.attributes[0].spec.kind = static_cast<EntityKind>(4); });
+  ExpectBroken([](Delta& d) { d.attributes[0].spec.type = static_cast<AttributeType>(6); });
+  ExpectBroken([](Delta& d) { d.attributes[0].spec.policy = static_cast<AttributePolicy>(5); });
+  ExpectBroken([](Delta& d) { d.attributes[0].spec.default_row.resize(7); });
+  ExpectBroken([](Delta& d) { d.attributes[0].spec.default_row.assign(8, 0xff); });
 }
 
 }  // namespace

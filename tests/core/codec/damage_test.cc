@@ -244,12 +244,55 @@ TEST(LimitsTest, ALongerPayloadThanAllowedIsRefusedByName) {
   EXPECT_EQ(GetErrorDetail(delta.status())->Find("limit"), "max_payload_bytes");
 }
 
+// A message of version 2 with one column: vertex, uint8, 2 components, max, "ab", default 3 4.
+constexpr char kDescription[] = {0, 5, 2, 3, 2, 'a', 'b', 3, 4};
+
+std::string WithDescription(absl::string_view description, char version) {
+  Delta delta;
+  delta.attributes.push_back(
+      {{"ab", EntityKind::kVertex, AttributeType::kUint8, 2, AttributePolicy::kMax, {3, 4}}, {}, {}});
+  ForgedMessage message = TakeApart(Encode(delta, Codec::kRaw));
+  message.header[4] = version;
+  message.sections[0].bytes = std::string(description);
+  message.sections[0].count = message.sections[0].size = description.size();
+  return message.Seal();
+}
+
+TEST(DescriptionTest, OfAColumnThatCannotBeIsRefused) {
+  const absl::string_view valid(kDescription, sizeof(kDescription));
+  ASSERT_TRUE(DecodeDelta(WithDescription(valid, 2)).ok());
+  const auto refused = [](std::string description, char version = 2) {
+    const absl::Status status = DecodeDelta(WithDescription(description, version)).status();
+    return ErrorReason(status) == reason::kCorruptPayload;
+  };
+  const auto changed = [&](size_t at, char byte) {
+    std::string description(valid);
+    description[at] = byte;
+    return description;
+  };
+  EXPECT_TRUE(refused(changed(0, 4))) << "kind";
+  for (char type : {0, 6, -1}) EXPECT_TRUE(refused(changed(1, type))) << "type " << int{type};
+  EXPECT_TRUE(refused(changed(1, 2))) << "a default of two bytes is none of two int32";
+  for (char components : {0, 1, 3, 17}) EXPECT_TRUE(refused(changed(2, components))) << int{components};
+  for (char policy : {0, 5, -1}) EXPECT_TRUE(refused(changed(3, policy))) << "policy " << int{policy};
+  for (char name_bytes : {0, 1, 3, 5, 64, -1})
+    EXPECT_TRUE(refused(changed(4, name_bytes))) << int{name_bytes};
+  for (size_t size = 1; size < valid.size(); ++size) {
+    if (size == 7) continue;  // no default: zeros
+    EXPECT_TRUE(refused(std::string(valid.substr(0, size)))) << size;
+  }
+  EXPECT_TRUE(refused(std::string("\0\3\1\1\1a\0\0\xc0\x7f", 10))) << "NaN";
+  EXPECT_TRUE(refused(std::string("\0\5\1ab", 5), 1)) << "version 1 has no uint8";
+}
+
 TEST(VersionTest, ANewerVersionIsToldFromDamage) {
-  std::string bytes = Encode({}, Codec::kRaw);
-  bytes[4] = 2;
-  for (const absl::Status& status : {DecodeDelta(bytes).status(), PeekDelta(bytes).status()}) {
-    EXPECT_EQ(status.code(), absl::StatusCode::kUnimplemented);
-    EXPECT_EQ(ErrorReason(status), reason::kUnsupportedFormat);
+  for (int version : {0, 3, 255}) {
+    std::string bytes = Encode({}, Codec::kRaw);
+    bytes[4] = static_cast<char>(version);
+    for (const absl::Status& status : {DecodeDelta(bytes).status(), PeekDelta(bytes).status()}) {
+      EXPECT_EQ(status.code(), absl::StatusCode::kUnimplemented);
+      EXPECT_EQ(ErrorReason(status), reason::kUnsupportedFormat);
+    }
   }
 }
 

@@ -74,14 +74,20 @@ void AddRandomElements(Rng& rng, EntityKind kind, int size, Delta& delta) {
   }
 }
 
+template <typename Float>
+void FillWithCoordinates(Rng& rng, std::vector<uint8_t>& rows) {
+  constexpr double kLargest = std::numeric_limits<Float>::max();
+  for (size_t i = 0; i < rows.size(); i += sizeof(Float)) {
+    const auto value = static_cast<Float>(std::clamp(RandomCoordinate(rng), -kLargest, kLargest));
+    std::memcpy(&rows[i], &value, sizeof(value));
+  }
+}
+
 std::vector<uint8_t> RandomRows(Rng& rng, const AttributeSpec& spec, size_t count) {
   std::vector<uint8_t> rows(count * spec.row_bytes());
   for (uint8_t& byte : rows) byte = static_cast<uint8_t>(rng());
-  if (spec.type == AttributeType::kInt32) return rows;
-  for (size_t i = 0; i < rows.size(); i += sizeof(double)) {
-    const double value = RandomCoordinate(rng);
-    std::memcpy(&rows[i], &value, sizeof(value));
-  }
+  if (spec.type == AttributeType::kFloat64) FillWithCoordinates<double>(rng, rows);
+  if (spec.type == AttributeType::kFloat32) FillWithCoordinates<float>(rng, rows);
   return rows;
 }
 
@@ -89,8 +95,10 @@ AttributeChanges RandomAttribute(Rng& rng, int size) {
   AttributeChanges changes;
   changes.spec.name = "column_" + std::to_string(rng() % 1000);
   changes.spec.kind = kEntityKinds[rng() % kNumEntityKinds];
-  changes.spec.type = rng() % 2 ? AttributeType::kFloat64 : AttributeType::kInt32;
+  changes.spec.type = static_cast<AttributeType>(1 + rng() % 5);
   changes.spec.components = 1 + rng() % kMaxAttributeComponents;
+  changes.spec.policy = static_cast<AttributePolicy>(rng() % 5);
+  if (rng() % 2) changes.spec.default_row = RandomRows(rng, changes.spec, 1);
   changes.slots = RandomSlots(rng, size);
   changes.rows = RandomRows(rng, changes.spec, changes.slots.size());
   return changes;
@@ -165,6 +173,12 @@ Delta WithAttributes() {
   delta.attributes.push_back({{"temperature", EntityKind::kVertex, AttributeType::kFloat64, 1}, {0, 9}, {}});
   delta.attributes.push_back({{"region", EntityKind::kCell, AttributeType::kInt32, 3}, {1}, {}});
   delta.attributes.push_back({{"empty", EntityKind::kFace, AttributeType::kInt32, 16}, {}, {}});
+  for (int type = 3; type <= 5; ++type) {
+    AttributeSpec spec{"type_" + std::to_string(type), EntityKind::kEdge, static_cast<AttributeType>(type), 2};
+    spec.policy = static_cast<AttributePolicy>(type - 1);
+    spec.default_row.assign(spec.row_bytes(), 3);
+    delta.attributes.push_back({spec, {4, 5, 1000}, {}});
+  }
   Rng rng(7);
   for (AttributeChanges& changes : delta.attributes) {
     changes.rows = RandomRows(rng, changes.spec, changes.slots.size());

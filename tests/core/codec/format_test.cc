@@ -88,6 +88,49 @@ constexpr char kDracoGolden[] =
     "dfb29753b6d415ab09030201726567696f6e00445241434f0203000000002f0000000101040501000001fe0101010101"
     "40010028b52ffd20c0850000200000020004000d40c1140260f10ab0721cd5e8aecec256";
 
+// A column that only version 2 can describe, as it was first written.
+constexpr char kColumnGolden[] =
+    "44594e4d0201000001000000000000000200000000000000000000000000000000000000000000000340011010410102"
+    "08420110100104010403737562ffffffffffffffff0300000001000000010000000000000002000000000000805e63bc"
+    "2b6e2c3745";
+
+Delta ColumnGolden() {
+  Delta delta;
+  delta.from_revision = 1;
+  delta.to_revision = 2;
+  const AttributeSpec spec{"sub", EntityKind::kEdge,      AttributeType::kInt64,
+                           1,     AttributePolicy::kDrop, {0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff}};
+  delta.attributes.push_back({spec, {3, 5}, {1, 0, 0, 0, 0, 0, 0, 0, 2, 0, 0, 0, 0, 0, 0, 0x80}});
+  return delta;
+}
+
+TEST(FormatTest, AColumnOfVersion2StaysAsItIs) {
+  EncodeOptions options;
+  options.codec = Codec::kRaw;
+  const absl::StatusOr<std::string> bytes = EncodeDelta(ColumnGolden(), options);
+  ASSERT_TRUE(bytes.ok()) << bytes.status();
+  EXPECT_EQ(absl::BytesToHexString(*bytes), kColumnGolden);
+  const absl::StatusOr<Delta> delta = DecodeDelta(absl::HexStringToBytes(kColumnGolden));
+  ASSERT_TRUE(delta.ok()) << delta.status();
+  EXPECT_TRUE(SameBits(*delta, ColumnGolden()));
+}
+
+TEST(FormatTest, OnlyColumnsThatNeedItAreOfVersion2) {
+  const auto version = [](const AttributeSpec& spec) {
+    Delta delta;
+    delta.attributes.push_back({spec, {}, {}});
+    return int{(*EncodeDelta(delta, {}))[4]};
+  };
+  AttributeSpec spec{"a", EntityKind::kCell, AttributeType::kInt32, 1};
+  EXPECT_EQ(version(spec), 1);
+  spec.policy = AttributePolicy::kCopy;
+  spec.default_row.assign(4, 0);
+  EXPECT_EQ(version(spec), 1) << "said in more words, but the same";
+  spec.policy = AttributePolicy::kMax;
+  EXPECT_EQ(version(spec), 2);
+  EXPECT_EQ(version({"a", EntityKind::kCell, AttributeType::kUint8, 1}), 2);
+}
+
 TEST(FormatTest, TheDocumentsExampleIsWhatTheCodeWrites) {
   const absl::StatusOr<std::string> bytes = EncodeDelta(Example(), {});
   ASSERT_TRUE(bytes.ok()) << bytes.status();

@@ -151,7 +151,8 @@ TEST(ZstdFrameTest, PartsAndWholesDecompressAlike) {
 
 TEST(PlanesTest, RowsOfEveryShapeComeBack) {
   Rng rng(12);
-  for (AttributeType type : {AttributeType::kFloat64, AttributeType::kInt32}) {
+  for (AttributeType type : {AttributeType::kFloat64, AttributeType::kInt32, AttributeType::kFloat32,
+                             AttributeType::kInt64, AttributeType::kUint8}) {
     for (int components : {1, 3, 16}) {
       for (int count : {1, 2, 300, 1000}) {
         const RowShape shape{type, components};

@@ -9,6 +9,7 @@
 #include "core/delta/mirror.h"
 #include "tests/support/meshes.h"
 #include "tests/support/random_edits.h"
+#include "tests/support/rows.h"
 
 namespace dynmesh::testing {
 namespace {
@@ -17,13 +18,7 @@ void ExpectEqual(const Mirror& mirror, const Mesh& mesh) {
   EXPECT_EQ(mirror.revision(), mesh.revision());
   EXPECT_EQ(mirror.checksum(), mesh.checksum());
   EXPECT_TRUE(ModelOf(mirror) == ModelOf(mesh));
-  ASSERT_EQ(mirror.attributes().size(), mesh.attributes().size());
-  for (const AttributeColumn& column : mesh.attributes()) {
-    const auto copy = std::find_if(mirror.attributes().begin(), mirror.attributes().end(),
-                                   [&](const AttributeColumn& c) { return c.spec() == column.spec(); });
-    ASSERT_NE(copy, mirror.attributes().end());
-    for (Slot slot = 0; slot < 64; ++slot) EXPECT_EQ(copy->Row(slot), column.Row(slot)) << slot;
-  }
+  ExpectSameRows(mirror.attributes(), mesh);
 }
 
 Delta ThroughCodec(const Delta& delta, Codec codec) {

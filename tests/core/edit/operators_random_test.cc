@@ -14,6 +14,7 @@
 #include "tests/support/meshes.h"
 #include "tests/support/oracle.h"
 #include "tests/support/random_edits.h"
+#include "tests/support/rows.h"
 
 namespace dynmesh::testing {
 namespace {
@@ -139,6 +140,61 @@ TEST(OperatorsRandomTest, OnRandomComplexesWithDuplicatesAndDegenerates) {
     Commit(mesh);
     RunOn(std::move(mesh), seed);
     if (HasFailure()) return;
+  }
+}
+
+/// For each kind and each policy that looks at parents a column that holds 5 everywhere, and 7 by default.
+void AddConstantColumns(Mesh& mesh) {
+  for (EntityKind kind : kEntityKinds) {
+    for (AttributePolicy policy :
+         {AttributePolicy::kInterpolate, AttributePolicy::kCopy, AttributePolicy::kMax}) {
+      const bool narrow = policy == AttributePolicy::kInterpolate;
+      const std::string name = "p" + std::to_string(static_cast<int>(policy));
+      const AttributeSpec spec = {name, kind,   narrow ? AttributeType::kFloat32 : AttributeType::kUint8,
+                                  1,    policy, narrow ? RowOf<float>({7}) : RowOf<uint8_t>({7})};
+      ASSERT_TRUE(mesh.AddAttribute(spec).ok());
+      const auto row = narrow ? RowOf<float>({5}) : RowOf<uint8_t>({5});
+      const int column = mesh.FindAttribute(name, kind);
+      mesh.slots(kind).live().ForEach(
+          [&](Slot slot) { ASSERT_TRUE(mesh.SetAttribute(column, slot, row).ok()); });
+    }
+  }
+  Commit(mesh);
+}
+
+double ValueAt(const AttributeColumn& column, Slot slot) {
+  return column.spec().type == AttributeType::kFloat32 ? ValuesOf<float>(column.Row(slot))[0]
+                                                       : ValuesOf<uint8_t>(column.Row(slot))[0];
+}
+
+void ExpectConstant(const Mesh& mesh, const AttributeColumn& column) {
+  const EntityKind kind = column.spec().kind;
+  for (Slot slot = 0; slot < mesh.slots(kind).limit(); ++slot) {
+    const EntityId id(kind, slot);
+    const double value = ValueAt(column, slot);
+    if (!mesh.IsLive(id)) {
+      ASSERT_EQ(value, 7) << EntityKindName(kind) << " " << slot;
+    } else if (kind == EntityKind::kVertex || mesh.IsElement(id)) {
+      ASSERT_EQ(value, 5) << EntityKindName(kind) << " " << slot;
+    } else {
+      ASSERT_TRUE(value == 5 || value == 7) << EntityKindName(kind) << " " << slot;
+    }
+  }
+}
+
+TEST(OperatorsRandomTest, AttributesThatAreConstantStayConstantAndAMirrorHasThem) {
+  uint32_t seed = 100;
+  for (auto& [name, mesh] : AllMeshes()) {
+    SCOPED_TRACE(name);
+    AddConstantColumns(mesh);
+    Dice dice(mesh, ++seed);
+    Mirror mirror;
+    for (int batch = 0; batch < 30; ++batch) {
+      ApplyAndCheck(mesh, dice, mirror);
+      for (const AttributeColumn& column : mesh.attributes()) ExpectConstant(mesh, column);
+      if (HasFailure()) FAIL() << "seed " << seed << ", batch " << batch;
+    }
+    ExpectSameRows(mirror.attributes(), mesh);
   }
 }
 

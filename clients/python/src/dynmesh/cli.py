@@ -344,5 +344,5 @@ def _describe(info: SessionInfo) -> str:
     for (source, target), size in info.stored_relations.items():
         lines.append(f"stored     {source}-{target}: {size / 2**20:.1f} MiB")
     for spec in info.attributes:
-        lines.append(f"attribute  {spec.name}: {spec.dtype}[{spec.components}] of {spec.kind}")
+        lines.append(f"attribute  {spec.name}: {spec.dtype}[{spec.components}] of {spec.kind}, {spec.policy}")
     return "\n".join(lines)

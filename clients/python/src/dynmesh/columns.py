@@ -1,4 +1,4 @@
-"""Attribute columns: named values for the entities of one kind, float64 or int32.
+"""Attribute columns: named values for the entities of one kind, of five scalar types.
 
 Nothing is rounded or truncated on the way in: what cannot be kept exactly is refused by name.
 """
@@ -12,8 +12,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike, DTypeLike, NDArray
 
+from .attribute_types import DTYPE_NAMES, POLICIES, SCALARS, exactly, policy_number, type_number
 from .errors import InvalidArgumentError
 from .kinds import EntityKind
 from .v1 import types_pb2
@@ -23,16 +24,11 @@ SLOT_COLUMN = "dynmesh:slot"
 
 _MAX_COMPONENTS = 16
 _NOT_IN_NAMES = re.compile(r"[^A-Za-z0-9_.-]")
-_WIRE_TYPES = {
-    np.dtype(np.float64): (types_pb2.ATTRIBUTE_TYPE_FLOAT64, "<f8"),
-    np.dtype(np.int32): (types_pb2.ATTRIBUTE_TYPE_INT32, "<i4"),
-}
-_DTYPES = {number: wire for number, wire in _WIRE_TYPES.values()}
 
 
 @dataclass(frozen=True)
 class Column:
-    """Values of all entities of `kind`, in order: float64 or int32 [n, components]."""
+    """Values of all entities of `kind`, in order: [n, components] of one of the five types."""
 
     name: str
     kind: EntityKind
@@ -43,40 +39,62 @@ class Column:
         return make_spec(self.name, self.kind, self.values.dtype, self.values.shape[1])
 
 
-def make_spec(name: str, kind: EntityKind, dtype: Any, components: int) -> types_pb2.AttributeSpec:
-    """AttributeSpec of a column. Raises `InvalidArgumentError` unless `dtype` is float64 or int32."""
-    wire = _WIRE_TYPES.get(np.dtype(dtype))
-    if wire is None:
-        raise _unfit(name, f"is {np.dtype(dtype)}; columns are float64 or int32")
-    return types_pb2.AttributeSpec(name=name, kind=int(kind), type=wire[0], components=components)
+def make_spec(
+    name: str,
+    kind: EntityKind,
+    dtype: DTypeLike,
+    components: int,
+    *,
+    default: ArrayLike | None = None,
+    policy: str | None = None,
+) -> types_pb2.AttributeSpec:
+    """AttributeSpec of a column.
+
+    Raises `InvalidArgumentError` for other types than the five, for what is no policy, and for a default that
+    is neither a number nor one for each component, or that the type cannot hold exactly.
+    """
+    number, of_policy = type_number(dtype), policy_number(policy)
+    if number is None:
+        raise _bad_field(name, "type", f"is {np.dtype(dtype)}; columns are {DTYPE_NAMES}")
+    if of_policy is None:
+        raise _bad_field(name, "policy", f"has policy {policy!r}, none of {', '.join(POLICIES.values())}")
+    return types_pb2.AttributeSpec(
+        name=name,
+        kind=int(kind),
+        type=number,
+        components=components,
+        default_row=b"" if default is None else _default_row(name, default, SCALARS[number], components),
+        policy=of_policy,
+    )
 
 
 def values_bytes(values: NDArray[Any]) -> bytes:
     """Rows as the wire has them. `values` must come from `as_values`."""
-    return values.astype(_WIRE_TYPES[values.dtype][1], copy=False).tobytes()
+    return values.astype(values.dtype.newbyteorder("<"), copy=False).tobytes()
 
 
 def values_from_proto(message: types_pb2.AttributeValues) -> NDArray[Any]:
     """Rows of an AttributeValues as [n, components]."""
-    flat = np.frombuffer(message.values, dtype=_DTYPES[message.spec.type])
+    flat = np.frombuffer(message.values, dtype=SCALARS[message.spec.type])
     return flat.reshape(-1, message.spec.components or 1)
 
 
 def as_values(values: ArrayLike, name: str) -> NDArray[Any]:
-    """`values` as float64 or int32 [n, components], exactly.
+    """`values` as [n, components], exactly, in the nearest type that columns can have.
 
-    float16 and float32 become float64; booleans and integers become int32 if every value fits.
-    Raises `InvalidArgumentError` otherwise, and for more than 16 components.
+    float16 becomes float32; booleans uint8; int8, int16 and uint16 int32; uint32 int64, and uint64 if every
+    value fits. Raises `InvalidArgumentError` otherwise, and for more than 16 components.
     """
     array = np.asarray(values)
     rows = array.reshape(-1, 1) if array.ndim == 1 else array
     if rows.ndim != 2 or not 1 <= rows.shape[1] <= _MAX_COMPONENTS:
         raise _unfit(name, f"has shape {array.shape}; columns have shape (n,) or (n, 1 to {_MAX_COMPONENTS})")
-    if rows.dtype.kind == "f" and rows.dtype.itemsize <= 8:
-        return rows.astype(np.float64, copy=False)
-    if rows.dtype.kind in "biu":
-        return _as_int32(rows, name)
-    raise _unfit(name, f"is {rows.dtype}; columns are float64 or int32")
+    dtype = _nearest(rows.dtype)
+    if dtype is None:
+        raise _unfit(name, f"is {rows.dtype}; columns are {DTYPE_NAMES}")
+    if rows.dtype == np.uint64 and rows.size and int(rows.max()) > np.iinfo(np.int64).max:
+        raise _unfit(name, "is uint64 with values that int64 cannot hold")
+    return rows.astype(dtype, copy=False)
 
 
 def point_columns(data: dict[str, ArrayLike], wanted: Collection[str] | None) -> list[Column]:
@@ -115,17 +133,41 @@ def _names(data: Iterable[str], wanted: Collection[str] | None) -> dict[str, str
 
 
 def _join(blocks: list[NDArray[Any]], name: str) -> NDArray[Any]:
-    """Blocks one below the other; int32 next to float64 becomes float64, which holds every int32."""
+    """Blocks one below the other, in a type that holds the values of all exactly."""
     if len({block.shape[1] for block in blocks}) > 1:
         raise _unfit(name, "has different numbers of components from block to block")
-    return np.concatenate(blocks)
+    dtype = np.result_type(*blocks)
+    joined = [block if block.dtype == dtype else exactly(block, dtype) for block in blocks]
+    if any(block is None for block in joined):
+        raise _unfit(name, f"has values in one block that {dtype}, which others need, cannot hold")
+    return np.concatenate([block for block in joined if block is not None])
 
 
-def _as_int32(rows: NDArray[Any], name: str) -> NDArray[np.int32]:
-    limits = np.iinfo(np.int32)
-    if rows.size and not (limits.min <= rows.min() and rows.max() <= limits.max):
-        raise _unfit(name, f"is {rows.dtype} with values that int32 cannot hold")
-    return rows.astype(np.int32, copy=False)
+def _nearest(dtype: np.dtype[Any]) -> DTypeLike | None:
+    """The narrowest type of columns that holds every value of `dtype` (of uint64: nearly every)."""
+    if dtype.kind == "f":
+        return {2: np.float32, 4: np.float32, 8: np.float64}.get(dtype.itemsize)
+    if dtype.kind == "b" or dtype == np.uint8:
+        return np.uint8
+    if dtype.kind not in "iu":
+        return None
+    return np.int32 if np.can_cast(dtype, np.int32) else np.int64
+
+
+def _default_row(name: str, default: ArrayLike, scalar: np.dtype[Any], components: int) -> bytes:
+    row = np.asarray(default)
+    if row.shape not in ((), (components,)):
+        what = f"has a default of shape {row.shape} for {components} components"
+        raise _bad_field(name, "default_row", what)
+    exact = exactly(row, scalar)
+    if exact is None:
+        raise _bad_field(name, "default_row", f"has a default that {scalar.name} cannot hold: {default!r}")
+    return np.broadcast_to(exact, components).tobytes()
+
+
+def _bad_field(name: str, field: str, what: str) -> InvalidArgumentError:
+    metadata = {"attribute": name, "field": field}
+    return InvalidArgumentError(f"column {name!r} {what}", reason="BAD_ARGUMENT", metadata=metadata)
 
 
 def _unfit(name: str, what: str) -> InvalidArgumentError:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .arrays import Ids, Points
+from .attribute_types import POLICIES, Policy
 from .checksum import Checksum
 from .errors import make_error
 from .kinds import NUM_VERTICES, ElementType, EntityKind
@@ -48,7 +49,9 @@ class AttributeChanges:
     name: str
     kind: EntityKind
     slots: Ids
-    values: NDArray[Any]  # float64 or int32 [n, components]
+    values: NDArray[Any]  # [n, components] of the column's type
+    default: NDArray[Any]  # [components]: the row of slots that no delta has written
+    policy: Policy
 
 
 @dataclass(frozen=True)
@@ -128,8 +131,10 @@ def _delta(parts: dict[str, Any]) -> Delta:
     )
 
 
-def _attribute(name: str, dimension: int, slots: Ids, values: NDArray[Any]) -> AttributeChanges:
-    return AttributeChanges(name, EntityKind(dimension + 1), slots, values)
+def _attribute(
+    name: str, dimension: int, slots: Ids, values: NDArray[Any], default: NDArray[Any], policy: int
+) -> AttributeChanges:
+    return AttributeChanges(name, EntityKind(dimension + 1), slots, values, default, POLICIES[policy])
 
 
 def element_rows(types: NDArray[np.uint8], vertices: Ids, width: int) -> Ids:

@@ -8,7 +8,7 @@ from types import TracebackType
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, DTypeLike
 
 from .arrays import (
     Ids,
@@ -22,6 +22,7 @@ from .arrays import (
     from_bytes,
     u32_bytes,
 )
+from .attribute_types import Policy
 from .columns import as_values, make_spec, values_bytes
 from .edit_result import EditResult, lineage_from_proto, refusal_from_proto
 from .errors import InvalidArgumentError
@@ -100,9 +101,34 @@ class EditBatch:
         remove = edits_pb2.RemoveElements(kind=int(as_kind(kind)), ids=u32_bytes(as_ids(ids)))
         return self._append(remove_elements=remove)
 
-    def add_attribute(self, name: str, kind: KindLike, dtype: Any = np.float64, components: int = 1) -> int:
-        """Adds a column of zeros, float64 or int32, for all entities of a kind. Returns the edit's index."""
-        return self._append(add_attribute=make_spec(name, as_kind(kind), dtype, components))
+    def add_attribute(
+        self,
+        name: str,
+        kind: KindLike,
+        dtype: DTypeLike = np.float64,
+        components: int = 1,
+        *,
+        default: ArrayLike | None = None,
+        policy: Policy | None = None,
+    ) -> int:
+        """Adds a column for all entities of a kind; returns the edit's index.
+
+        Parameters
+        ----------
+        dtype : float64, float32, int64, int32 or uint8
+        components : int
+            1 to 16.
+        default : number or [components], optional
+            The row of entities for which none is set, finite and exactly of `dtype`. Default: zeros.
+        policy : "interpolate", "copy", "max" or "drop", optional
+            Which row a vertex, edge, face or cell takes that an operator makes of others: theirs by weight
+            (integers to the nearest), that of the one that weighs most, the greatest of each component, or the
+            default.
+            Default: "interpolate" for floating-point numbers, "copy" for integers.
+        """
+        return self._append(
+            add_attribute=make_spec(name, as_kind(kind), dtype, components, default=default, policy=policy)
+        )
 
     def set_attribute(self, name: str, kind: KindLike, ids: ArrayLike, values: ArrayLike) -> int:
         """Sets rows of an attribute; returns the edit's index.
@@ -111,7 +137,8 @@ class EditBatch:
         ----------
         ids : uint32[n]
         values : float[n], int[n], float[n, components] or int[n, components]
-            Must have the column's type: float64 (single precision is widened) or int32.
+            Of any type: the batch is refused (INEXACT_VALUE) if the column's type cannot hold one of them
+            exactly. So 0.1 is ``np.float32(0.1)`` for a column of float32.
         """
         slots, rows = as_ids(self._wire(ids)), as_values(values, name)
         _check_same_length("values", len(rows), len(slots))

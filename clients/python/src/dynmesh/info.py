@@ -7,12 +7,11 @@ from datetime import datetime, timezone
 from typing import Any, NamedTuple
 
 from .arrays import Ids, Points, from_bytes
+from .attribute_types import POLICIES, SCALARS, Policy, default_policy, row_from_bytes
 from .checksum import Checksum
 from .kinds import EntityKind
 from .relations import Relation, relation_from_proto
 from .v1 import sessions_pb2, types_pb2
-
-_TYPE_NAMES = {types_pb2.ATTRIBUTE_TYPE_FLOAT64: "float64", types_pb2.ATTRIBUTE_TYPE_INT32: "int32"}
 
 
 class Counts(NamedTuple):
@@ -29,8 +28,10 @@ class AttributeSpec(NamedTuple):
 
     name: str
     kind: EntityKind
-    dtype: str  # "float64" or "int32"
+    dtype: str  # "float64", "float32", "int64", "int32" or "uint8"
     components: int
+    policy: Policy  # what operators make of rows: `EditBatch.add_attribute`
+    default: tuple[float, ...]  # the row of entities for which none was set
 
 
 @dataclass(frozen=True)
@@ -172,7 +173,16 @@ def info_from_proto(message: sessions_pb2.Session) -> SessionInfo:
 
 
 def _spec_from_proto(spec: types_pb2.AttributeSpec) -> AttributeSpec:
-    return AttributeSpec(spec.name, EntityKind(spec.kind), _TYPE_NAMES[spec.type], spec.components or 1)
+    components = spec.components or 1
+    default = row_from_bytes(spec.default_row, spec.type, components)
+    return AttributeSpec(
+        name=spec.name,
+        kind=EntityKind(spec.kind),
+        dtype=SCALARS[spec.type].name,
+        components=components,
+        policy=POLICIES.get(spec.policy, default_policy(spec.type)),
+        default=tuple(default.tolist()),
+    )
 
 
 def _bounds(message: sessions_pb2.Session) -> Points | None:

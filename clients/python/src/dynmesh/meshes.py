@@ -76,7 +76,7 @@ def from_meshio(mesh: meshio.Mesh, attributes: Collection[str] | None = None) ->
     ------
     InvalidArgumentError
         A type of cells that dynmesh has not (the message names the block), a name in `attributes` that the mesh
-        has not, or data that neither float64 nor int32 holds exactly.
+        has not, or data that no type of columns holds exactly.
     """
     _check_names(mesh, attributes)
     kinds: list[EntityKind | None] = []

@@ -145,7 +145,7 @@ class Mirror:
         return Elements(frozen(table.types), frozen(table.vertices))
 
     def attribute(self, name: str, kind: KindLike) -> NDArray[Any]:
-        """Rows of an attribute by slot: float64 or int32 [size, components]; those beyond are zeros.
+        """Rows of an attribute by slot: [size, components] of its type; those beyond are its default row.
 
         Raises KeyError if there is no such column.
         """

@@ -231,17 +231,18 @@ class ElementTable:
 
 
 class AttributeTable:
-    """Rows of one attribute by slot; zeros where none was ever written."""
+    """Rows of one attribute by slot; the default where none was ever written."""
 
     def __init__(self, first: AttributeChanges) -> None:
         self.name = first.name
         self.kind = first.kind
+        self.default = first.default
         self._values = np.zeros((0, first.values.shape[1]), dtype=first.values.dtype)
         self.size = 0
 
     @property
     def values(self) -> NDArray[Any]:
-        """float64 or int32 [size, components]"""
+        """[size, components] of the column's type"""
         return self._values[: self.size]
 
     def apply(self, changes: AttributeChanges) -> None:
@@ -249,21 +250,24 @@ class AttributeTable:
         if not changes.slots.size:
             return
         self.size = max(self.size, int(changes.slots[-1]) + 1)
-        self._values = _grown(self._values, self.size)
+        self._values = _grown(self._values, self.size, self.default)
         self._values[changes.slots] = changes.values
 
     def attribute(self) -> Attribute:
-        """A copy of the rows that are not zero, for a snapshot."""
-        slots = np.flatnonzero(self.values.any(axis=1))
-        return Attribute(self.name, self.kind, slots.astype(np.uint32), self.values[slots])
+        """A copy of the rows that are not the default, for a snapshot."""
+        slots = np.flatnonzero((self.values != self.default).any(axis=1))
+        return Attribute(self.name, self.kind, slots.astype(np.uint32), self.values[slots], self.default)
 
 
-def _grown(array: NDArray[Any], size: int) -> NDArray[Any]:
-    """`array` with room for `size` rows: at least doubled when it has to grow, so that growing is rare."""
+def _grown(array: NDArray[Any], size: int, fill: NDArray[Any] | int = 0) -> NDArray[Any]:
+    """`array` with room for `size` rows, new ones like `fill`: at least doubled when it has to grow, so that
+    growing is rare."""
     if size <= len(array):
         return array
     grown = np.zeros((max(size, 2 * len(array)), *array.shape[1:]), dtype=array.dtype)
     grown[: len(array)] = array
+    if np.any(fill):
+        grown[len(array) :] = fill
     return grown
 
 

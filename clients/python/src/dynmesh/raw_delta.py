@@ -13,15 +13,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .arrays import Ids, Points
+from .attribute_types import POLICIES, SCALARS, row_from_bytes
 from .errors import DataLossError, UnimplementedError
 from .kinds import NUM_VERTICES, ElementType
 
 _HEADER = struct.Struct("<4sBBBBqqQQ")
 _GRID = struct.Struct("<dddd")
 _SEAL_BYTES = 8
+_VERSIONS = (1, 2)
 _RAW = 1
 _PADDING, _REMOVED_VERTICES, _VERTICES, _POSITIONS, _GRID_X, _COLUMNS = 0, 1, 2, 3, 4, 64
-_SCALARS = {1: np.dtype("<f8"), 2: np.dtype("<i4")}
+_POLICY_OF_KIND = {"f": 1, "i": 2}  # of version 1, which names none
 _MAX_SLOT = 2**32 - 2
 
 
@@ -45,7 +47,7 @@ def _decode(payload: memoryview) -> dict[str, Any]:
     magic, version, flags, bits, _, from_revision, to_revision, *checksum = _HEADER.unpack_from(payload)
     if magic != b"DYNM":
         raise _corrupt("it does not begin like a delta")
-    if version != 1:
+    if version not in _VERSIONS:
         raise UnimplementedError(f"deltas of version {version} are too new", reason="UNSUPPORTED_FORMAT")
     _check_seal(payload)
     at = _HEADER.size
@@ -60,7 +62,7 @@ def _decode(payload: memoryview) -> dict[str, Any]:
         "vertex_slots": vertex_slots,
         "positions": _positions(sections, vertex_slots.size, grid),
         "elements": [_elements(sections, dimension) for dimension in (1, 2, 3)],
-        "attributes": _attributes(sections),
+        "attributes": _attributes(sections, version),
         "checksum": tuple(checksum),
         "position_bits": bits,
     }
@@ -144,19 +146,36 @@ def _elements(sections: dict[int, memoryview], dimension: int) -> tuple[Ids, Ids
     return _slots(sections, base), slots, types, vertices
 
 
-def _attributes(sections: dict[int, memoryview]) -> list[tuple[str, int, Ids, NDArray[Any]]]:
+def _attributes(
+    sections: dict[int, memoryview], version: int
+) -> list[tuple[str, int, Ids, NDArray[Any], NDArray[Any], int]]:
     columns = []
     base = _COLUMNS
     while base in sections:
-        description = bytes(sections[base])
-        dimension, scalar, components = description[:3]
-        values = np.frombuffer(sections.get(base + 2, b""), dtype=_SCALARS[scalar]).reshape(-1, components)
+        name, dimension, scalar, default, policy = _description(bytes(sections[base]), version)
+        values = np.frombuffer(sections.get(base + 2, b""), dtype=SCALARS[scalar]).reshape(-1, default.size)
         slots = _slots(sections, base + 1)
         if len(values) != slots.size:
             raise _corrupt("rows are not one for each slot")
-        columns.append((description[3:].decode(), dimension, slots, values))
+        if not (np.isfinite(values).all() and np.isfinite(default).all()):
+            raise _corrupt("rows are not all finite")
+        columns.append((name, dimension, slots, values, default, policy))
         base += 4
     return columns
+
+
+def _description(description: bytes, version: int) -> tuple[str, int, int, NDArray[Any], int]:
+    """Name, dimension, number of the type, default row and number of the policy of a column."""
+    dimension, scalar, components = description[:3]
+    if version == 1:
+        default = row_from_bytes(b"", scalar, components)
+        return description[3:].decode(), dimension, scalar, default, _POLICY_OF_KIND[default.dtype.kind]
+    policy, name_bytes = description[3:5]
+    end = 5 + name_bytes
+    if policy not in POLICIES or end > len(description):
+        raise _corrupt("a column's description is not valid")
+    default = row_from_bytes(description[end:], scalar, components)
+    return description[5:end].decode(), dimension, scalar, default, policy
 
 
 def _varint(payload: memoryview, at: int) -> tuple[int, int]:

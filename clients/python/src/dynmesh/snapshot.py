@@ -30,12 +30,14 @@ class Block:
 
 @dataclass(frozen=True)
 class Attribute:
-    """Rows of an attribute: ids uint32[n], ascending, and values float64 or int32 [n, components]."""
+    """Rows of an attribute: ids uint32[n], ascending, values [n, components], and the row [components] of all
+    other entities of its kind."""
 
     name: str
     kind: EntityKind
     ids: Ids
     values: NDArray[Any]
+    default: NDArray[Any]
 
 
 @dataclass(frozen=True)
@@ -78,8 +80,8 @@ class Snapshot:
         `ElementType`, with its elements by id. Degenerate and duplicate elements stay, isolated vertices
         too. Wedges are in meshio's node order (gmsh's, not VTK's).
 
-        An attribute of one kind has zeros in the blocks of other kinds, which is what the server holds for
-        rows never set; attributes of derived faces and edges have no place in meshio and are left out.
+        An attribute of one kind has its default in the blocks of other kinds, which is what the server holds
+        for rows never set; attributes of derived faces and edges have no place in meshio and are left out.
         Attributes of the same name and different shape on two kinds are called ``name:kind``.
 
         Parameters
@@ -107,7 +109,8 @@ class Snapshot:
 
     def _attributes_of(self, kind: EntityKind, ids: Ids) -> list[Attribute]:
         """Attributes of a kind with one row for each of `ids`."""
-        return [Attribute(a.name, kind, ids, _rows_at(a, ids)) for a in self.attributes if a.kind == kind]
+        rows = [(a, _rows_at(a, ids)) for a in self.attributes if a.kind == kind]
+        return [Attribute(a.name, kind, ids, values, a.default) for a, values in rows]
 
     def _cell_data(self) -> dict[str, list[NDArray[Any]]]:
         kinds = {block.type.kind for block in self.blocks}
@@ -117,7 +120,7 @@ class Snapshot:
         data: dict[str, list[NDArray[Any]]] = {}
         for a in columns:
             key = f"{a.name}:{a.kind}" if a.name in clashes else a.name
-            blocks = data.setdefault(key, [_flat(_zeros(a, block.ids.size)) for block in self.blocks])
+            blocks = data.setdefault(key, [_flat(_defaults(a, block.ids.size)) for block in self.blocks])
             for i, block in enumerate(self.blocks):
                 if block.type.kind == a.kind:
                     blocks[i] = _flat(_rows_at(a, block.ids))
@@ -129,8 +132,8 @@ def _meshio_order(block: Block) -> Ids:
 
 
 def _rows_at(attribute: Attribute, ids: Ids) -> NDArray[Any]:
-    """The rows of `ids`; zeros where there is none."""
-    rows = _zeros(attribute, ids.size)
+    """The rows of `ids`; the default where there is none."""
+    rows = _defaults(attribute, ids.size)
     at = np.searchsorted(attribute.ids, ids)
     known = at < attribute.ids.size
     known[known] = attribute.ids[at[known]] == ids[known]
@@ -138,8 +141,8 @@ def _rows_at(attribute: Attribute, ids: Ids) -> NDArray[Any]:
     return rows
 
 
-def _zeros(attribute: Attribute, count: int) -> NDArray[Any]:
-    return np.zeros((count, attribute.values.shape[1]), dtype=attribute.values.dtype)
+def _defaults(attribute: Attribute, count: int) -> NDArray[Any]:
+    return np.tile(attribute.default, (count, 1))
 
 
 def _flat(values: NDArray[Any]) -> NDArray[Any]:

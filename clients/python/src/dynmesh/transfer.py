@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .arrays import CHUNK_BYTES, Ids, concatenate, f64_bytes, from_bytes, u32_bytes
+from .attribute_types import row_from_bytes
 from .columns import Column, values_bytes, values_from_proto
 from .errors import InternalError
 from .info import MeshWarning, SessionInfo, info_from_proto, warning_from_proto
@@ -132,7 +133,9 @@ class ExportReader:
 
 def _attribute(kind: EntityKind, name: str, chunks: list[types_pb2.AttributeValues]) -> Attribute:
     ids = concatenate([from_bytes(chunk.ids, "<u4") for chunk in chunks], np.uint32)
-    return Attribute(name, kind, ids, np.concatenate([values_from_proto(chunk) for chunk in chunks]))
+    spec = chunks[0].spec
+    default = row_from_bytes(spec.default_row, spec.type, spec.components or 1)
+    return Attribute(name, kind, ids, np.concatenate([values_from_proto(chunk) for chunk in chunks]), default)
 
 
 def _attribute_rows(column: Column, rows: NDArray[Any]) -> types_pb2.AttributeValues:

@@ -70,15 +70,26 @@ py::tuple ElementLists(const ElementChanges& changes, const py::object& owner) {
 py::array Values(const AttributeChanges& changes, const py::object& owner) {
   const std::vector<py::ssize_t> shape = {static_cast<py::ssize_t>(changes.slots.size()),
                                           changes.spec.components};
-  return changes.spec.type == AttributeType::kInt32 ? View<int32_t>(changes.rows.data(), shape, owner)
-                                                    : View<double>(changes.rows.data(), shape, owner);
+  return WithScalar(changes.spec.type, [&](auto scalar) -> py::array {
+    return View<decltype(scalar)>(changes.rows.data(), shape, owner);
+  });
+}
+
+/// A copy: [components].
+py::array DefaultRow(const AttributeSpec& spec) {
+  const AttributeColumn column(spec);
+  return WithScalar(spec.type, [&](auto scalar) -> py::array {
+    return py::array_t<decltype(scalar)>(
+        spec.components, reinterpret_cast<const decltype(scalar)*>(column.default_row().data()));
+  });
 }
 
 py::list AttributeLists(const Delta& delta, const py::object& owner) {
   py::list lists;
   for (const AttributeChanges& changes : delta.attributes) {
     lists.append(py::make_tuple(changes.spec.name, Dimension(changes.spec.kind),
-                                View<uint32_t>(changes.slots, owner), Values(changes, owner)));
+                                View<uint32_t>(changes.slots, owner), Values(changes, owner),
+                                DefaultRow(changes.spec), static_cast<int>(changes.spec.effective_policy())));
   }
   return lists;
 }
