@@ -81,6 +81,15 @@ absl::Status CheckNotDegenerate(const Mesh& mesh, const Star& star) {
   return status;
 }
 
+absl::Status CheckTetrahedra(const Mesh& mesh, absl::Span<const CellId> cells) {
+  for (CellId c : cells) {
+    if (mesh.Type(c) == ElementType::kTetrahedron) continue;
+    return Refuse(reason::kNotSimplex, absl::StrCat("cell ", c.slot(), " is no tetrahedron"),
+                  EntityKind::kCell, {c.slot()});
+  }
+  return absl::OkStatus();
+}
+
 bool Contains(absl::Span<const VertexId> vertices, VertexId v) {
   return std::find(vertices.begin(), vertices.end(), v) != vertices.end();
 }
