@@ -119,7 +119,11 @@ absl::StatusOr<Ring> RingRound(const Mesh& mesh, EdgeId e, absl::Span<const Cell
 class RingFiller {
  public:
   RingFiller(const Mesh& mesh, EdgeId e, absl::Span<const VertexId> ring, int orientation)
-      : mesh_(mesh), a_(mesh.Vertices(e)[0]), b_(mesh.Vertices(e)[1]), ring_(ring), orientation_(orientation) {}
+      : mesh_(mesh),
+        a_(mesh.Vertices(e)[0]),
+        b_(mesh.Vertices(e)[1]),
+        ring_(ring),
+        orientation_(orientation) {}
 
   /// Finds the triangulation that makes the worst new tetrahedron best, and adds its tetrahedra. False when
   /// every one needs an edge or face that is there already.
