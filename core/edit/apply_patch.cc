@@ -2,10 +2,9 @@
 
 #include <algorithm>
 #include <cstring>
-#include <new>
-#include <stdexcept>
 
 #include "absl/strings/str_cat.h"
+#include "core/edit/run_batch.h"
 #include "core/edit/star.h"
 
 namespace dynmesh {
@@ -146,13 +145,6 @@ absl::Status Apply(Mesh& mesh, const Patch& patch, AppliedPatch& applied) {
                 absl::StrCat("the Euler characteristic would change by ", after - before), kind, ids);
 }
 
-/// Memory that runs out here leaves a mesh that nobody can put back: no refusal, but the end of it.
-void PutBack(Mesh& mesh, Mesh::Savepoint savepoint) try {
-  mesh.RollbackTo(savepoint);
-} catch (const std::bad_alloc&) {
-  throw std::runtime_error("memory ran out while an edit was rolled back");
-}
-
 }  // namespace
 
 absl::Status ApplyPatch(Mesh& mesh, const Patch& patch, AppliedPatch& applied) {
@@ -161,7 +153,7 @@ absl::Status ApplyPatch(Mesh& mesh, const Patch& patch, AppliedPatch& applied) {
   applied.added.clear();
   applied.attribute_bytes = 0;
   absl::Status status = Apply(mesh, patch, applied);
-  if (!status.ok()) PutBack(mesh, savepoint);
+  if (!status.ok()) PutBackTo(mesh, savepoint);
   return status;
 }
 
