@@ -8,8 +8,8 @@
 namespace dynmesh {
 
 /// Gives each fan of elements at a vertex (fans.h) a vertex of its own: the first fan keeps the vertex, the
-/// others get copies of it, with its position and attributes. Vertices are taken in ascending order, and those
-/// of the elements that got a copy once more: a face that hung on a cell may have lost it.
+/// others get copies of it, with its position and attributes. Vertices are taken in ascending order, and
+/// those of the elements that got a copy once more: a face that hung on a cell may have lost it.
 ///
 ///     two fans of triangles at v       ->  v and v'
 ///     three faces on the edge a b      ->  a sheet each, but where two go on together at both ends
