@@ -11,8 +11,8 @@ constexpr uint64_t kStepsBetweenCharges = WorkMeter::kMaxCharge / 2;
 /// Of an element that is replaced: finding, linking and journaling it and what it needs.
 constexpr uint64_t kStepsToReplace = 20;
 
-/// Of a new element with its share of faces and edges, and of the journal.
-constexpr uint64_t kBytesOfElement = 400;
+/// Of a new element with its share of new faces and edges, and of the journal: often less, at times more.
+constexpr uint64_t kBytesOfElement = 150;
 
 }  // namespace
 

@@ -99,10 +99,14 @@ class SessionRepair {
                     stop_);
     DYNMESH_RETURN_IF_ERROR(meter.ChargeBytes(0));
     done_(0);
-    return RepairMesh(mesh, request_.steps, meter, [this](size_t i, const RepairReport& report) {
-      outcome_.reports.push_back(report);
-      done_(i + 1);
-    });
+    DYNMESH_RETURN_IF_ERROR(
+        RepairMesh(mesh, request_.steps, meter, [this](size_t i, const RepairReport& report) {
+          outcome_.reports.push_back(report);
+          done_(i + 1);
+        }));
+    const uint64_t max_bytes = session_.limits().max_session_bytes;  // the meter was told estimates
+    const uint64_t bytes = mesh.memory_bytes();
+    return bytes <= max_bytes ? absl::OkStatus() : LimitExceeded("max_session_bytes", max_bytes, bytes);
   }
 
   Session& session_;
