@@ -44,9 +44,14 @@ absl::Status SplitVertex(RepairWork& work, VertexId v, BitSet& pending, RepairRe
   return absl::OkStatus();
 }
 
-uint64_t NumFaceElements(const Mesh& mesh, EdgeId e) {
-  const auto faces = mesh.IncidentFaces(e);
-  return std::count_if(faces.begin(), faces.end(), [&](FaceId f) { return mesh.IsElement(f); });
+/// Whether more than two faces that are elements meet at an edge, or more than two that bound cells.
+bool IsPinched(const Mesh& mesh, EdgeId e) {
+  int elements = 0, bounds = 0;
+  for (FaceId f : mesh.IncidentFaces(e)) {
+    elements += mesh.IsElement(f);
+    bounds += mesh.IncidentCells(f).size() == 1;
+  }
+  return elements > 2 || bounds > 2;
 }
 
 /// Notes what is left.
@@ -55,7 +60,7 @@ absl::Status FindRest(RepairWork& work, RepairReport& report) {
   const BitSet& edges = mesh.slots(EntityKind::kEdge).live();
   for (EdgeId e(edges.Next(0)); e.valid(); e = EdgeId(edges.Next(e.slot() + 1))) {
     DYNMESH_RETURN_IF_ERROR(work.Charge(1 + mesh.IncidentFaces(e).size()));
-    if (NumFaceElements(mesh, e) > 2) report.Add(RepairFinding::kStillNonManifold, e);
+    if (IsPinched(mesh, e)) report.Add(RepairFinding::kStillNonManifold, e);
   }
   const BitSet& faces = mesh.slots(EntityKind::kFace).live();
   for (FaceId f(faces.Next(0)); f.valid(); f = FaceId(faces.Next(f.slot() + 1))) {

@@ -19,9 +19,9 @@ namespace dynmesh {
 /// and later turns take no such edge apart (cutting of Gueziec, Taubin, Lazarus, Horn, "Cutting and
 /// stitching: converting sets of polygons to manifold surfaces", 2001). Solids may stay non-manifold where an
 /// edge or a face is pinched between cells that hang together at both ends: copies of vertices cannot mend
-/// that. Findings: kSplit, kAdded, kStillNonManifold (edges of more than two faces, faces of more than two
-/// cells). A second run finds nothing to split. Errors: those of Mesh's edits; the meter's. REQUIRES: a batch
-/// is open. Cost: linear in the stars of all vertices.
+/// that. Findings: kSplit, kAdded, kStillNonManifold (edges of more than two faces that are elements, or that
+/// bound solids; faces of more than two cells). A second run finds nothing to split. Errors: those of Mesh's
+/// edits; the meter's. REQUIRES: a batch is open. Cost: linear in the stars of all vertices.
 absl::StatusOr<RepairReport> SplitNonManifold(RepairWork& work);
 
 }  // namespace dynmesh

@@ -127,6 +127,60 @@ TEST(RepairsRandomTest, AnySoupOfTrianglesAndQuadsIsManifoldOnceSplit) {
   EXPECT_GT(broken, 50);
 }
 
+/// By brute force: whether the cells at each vertex hang together through faces at it that just two of them
+/// have.
+bool CellsHangTogether(const Mesh& mesh) {
+  std::map<std::set<VertexId>, std::set<EntityId>> faces;
+  std::map<VertexId, std::set<EntityId>> stars;
+  for (const auto& [id, element] : ModelOf(mesh).elements) {
+    const ElementTemplate& shape = TemplateOf(element.type);
+    for (int i = 0; i < shape.num_faces; ++i) {
+      const FaceVertices face(shape.faces[i], element.vertices);
+      faces[{face.span().begin(), face.span().end()}].insert(id);
+    }
+    for (VertexId v : element.vertices) stars[v].insert(id);
+  }
+  for (const auto& [v, star] : stars) {
+    std::set<EntityId> reached = {*star.begin()};
+    for (size_t before = 0; before != reached.size();) {
+      before = reached.size();
+      for (const auto& [vertices, cells] : faces) {
+        if (vertices.count(v) == 0 || cells.size() != 2) continue;
+        if (reached.count(*cells.begin()) + reached.count(*cells.rbegin()) == 1) {
+          reached.insert(cells.begin(), cells.end());
+        }
+      }
+    }
+    if (reached.size() != star.size()) return false;
+  }
+  return true;
+}
+
+TEST(RepairsRandomTest, AnySoupOfTetrahedraHangsTogetherAtEachVertexOnceSplit) {
+  int broken = 0;
+  for (uint32_t seed = 1; seed <= 30; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    Mesh mesh;
+    std::mt19937 rng(seed);
+    const std::vector<VertexId> vertices = AddVertices(mesh, 9);
+    std::set<std::set<VertexId>> known;
+    for (int i = 0; i < 14; ++i) {
+      std::vector<VertexId> all = vertices;
+      std::shuffle(all.begin(), all.end(), rng);
+      all.resize(4);
+      if (!known.insert({all.begin(), all.end()}).second) continue;
+      ASSERT_TRUE(mesh.AddElement(ElementType::kTetrahedron, all).ok());
+    }
+    Commit(mesh);
+    broken += !CellsHangTogether(mesh);
+    const uint32_t cells = mesh.NumElements(EntityKind::kCell);
+    Repair(mesh, SplitNonManifoldStep{});
+    EXPECT_TRUE(CellsHangTogether(mesh));
+    EXPECT_EQ(mesh.NumElements(EntityKind::kCell), cells);
+  }
+  EXPECT_GT(broken, 20);
+}
+
 TEST(RepairsRandomTest, EveryStepOnMeshesBrokenInAnyWayKeepsThemSoundAndFindsNothingTheSecondTime) {
   for (uint32_t seed = 1; seed <= 40; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));

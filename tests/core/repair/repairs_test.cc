@@ -319,6 +319,17 @@ TEST(SplitNonManifoldTest, ThreeCellsOnOneFaceComeApart) {
   EXPECT_EQ(Euler(mesh), 3);
 }
 
+TEST(SplitNonManifoldTest, AnEdgeBetweenCellsThatHangTogetherAtBothEndsIsToldAndStays) {
+  Mesh mesh = HexGrid(2, 2, 3);  // of the middle layer two opposite cells go
+  mesh.BeginBatch();
+  for (Slot c : {4, 7}) ASSERT_TRUE(mesh.RemoveElement(CellId(c)).ok());
+  Commit(mesh);
+  const RepairReport report = Repair(mesh, SplitNonManifoldStep{});
+  EXPECT_EQ(report.Count(RepairFinding::kSplit), 0u);
+  const EdgeId pinched = mesh.FindEdge(VertexId(13), VertexId(22));
+  EXPECT_THAT(Found(report, RepairFinding::kStillNonManifold), ElementsAre(EntityId(pinched)));
+}
+
 // ---- Fill holes ----
 
 TEST(FillHolesTest, ACubeWithAMissingSideIsClosedAndFacesOutwards) {
