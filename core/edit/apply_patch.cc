@@ -1,13 +1,12 @@
 #include "core/edit/apply_patch.h"
 
-#include <new>
-#include <stdexcept>
 
 #include "absl/container/inlined_vector.h"
 #include "absl/strings/str_cat.h"
 #include "core/edit/derived_rows.h"
 #include "core/edit/mix_rows.h"
 #include "core/edit/row_writer.h"
+#include "core/edit/run_batch.h"
 #include "core/edit/star.h"
 
 namespace dynmesh {
@@ -127,13 +126,6 @@ absl::Status Apply(Mesh& mesh, const Patch& patch, AppliedPatch& applied, RowWri
                 absl::StrCat("the Euler characteristic would change by ", after - before), kind, ids);
 }
 
-/// Memory that runs out here leaves a mesh that nobody can put back: no refusal, but the end of it.
-void PutBack(Mesh& mesh, Mesh::Savepoint savepoint) try {
-  mesh.RollbackTo(savepoint);
-} catch (const std::bad_alloc&) {
-  throw std::runtime_error("memory ran out while an edit was rolled back");
-}
-
 }  // namespace
 
 absl::Status ApplyPatch(Mesh& mesh, const Patch& patch, AppliedPatch& applied, uint64_t max_attribute_bytes) {
@@ -143,7 +135,7 @@ absl::Status ApplyPatch(Mesh& mesh, const Patch& patch, AppliedPatch& applied, u
   RowWriter writer(mesh, max_attribute_bytes);
   absl::Status status = Apply(mesh, patch, applied, writer);
   applied.attribute_bytes = writer.bytes();
-  if (!status.ok()) PutBack(mesh, savepoint);
+  if (!status.ok()) PutBackTo(mesh, savepoint);
   return status;
 }
 

@@ -81,17 +81,23 @@ struct MergeVerticesEdit {
   std::vector<Point> positions;  ///< where they meet; or none: where the first one is
   PatchLimits limits;
 };
+/// Removes vertices and fills the gaps anew: see remove_vertex.h.
+struct DissolveVerticesEdit {
+  std::vector<Slot> vertices;
+  PatchLimits limits;
+};
 
 using Edit =
     std::variant<AddVerticesEdit, RemoveVerticesEdit, MoveVerticesEdit, AddElementsEdit, RemoveElementsEdit,
                  AddAttributeEdit, SetAttributeEdit, SplitEdgesEdit, CollapseEdgesEdit, SwapEdgesEdit,
-                 SwapFacesEdit, SplitElementsEdit, MergeVerticesEdit>;
+                 SwapFacesEdit, SplitElementsEdit, MergeVerticesEdit, DissolveVerticesEdit>;
 
-/// Whether it splits, collapses, swaps or merges.
+/// Whether it splits, collapses, swaps, merges or dissolves.
 inline bool IsOperator(const Edit& edit) {
   return std::holds_alternative<SplitEdgesEdit>(edit) || std::holds_alternative<CollapseEdgesEdit>(edit) ||
          std::holds_alternative<SwapEdgesEdit>(edit) || std::holds_alternative<SwapFacesEdit>(edit) ||
-         std::holds_alternative<SplitElementsEdit>(edit) || std::holds_alternative<MergeVerticesEdit>(edit);
+         std::holds_alternative<SplitElementsEdit>(edit) || std::holds_alternative<MergeVerticesEdit>(edit) ||
+         std::holds_alternative<DissolveVerticesEdit>(edit);
 }
 
 /// How many vertices, elements, rows, or places for an operator an edit names.

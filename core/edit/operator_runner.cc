@@ -6,6 +6,7 @@
 #include "core/edit/bad_argument.h"
 #include "core/edit/collapse.h"
 #include "core/edit/merge.h"
+#include "core/edit/remove_vertex.h"
 #include "core/edit/split.h"
 #include "core/edit/star.h"
 #include "core/edit/swap.h"
@@ -134,6 +135,13 @@ absl::Status OperatorRunner::Run(const MergeVerticesEdit& edit) {
     DYNMESH_ASSIGN_OR_RETURN(const VertexId kept, names_.LiveVertex(edit.pairs[2 * i]));
     DYNMESH_ASSIGN_OR_RETURN(const VertexId gone, names_.LiveVertex(edit.pairs[2 * i + 1]));
     return PlanMergeVertices(mesh_, kept, gone, PositionAt(edit.positions, i), patch_);
+  });
+}
+
+absl::Status OperatorRunner::Run(const DissolveVerticesEdit& edit) {
+  return RunAll({edit.vertices.size(), 0}, edit.limits, [&](size_t i) -> absl::Status {
+    DYNMESH_ASSIGN_OR_RETURN(const VertexId v, names_.LiveVertex(edit.vertices[i]));
+    return PlanRemoveVertex(mesh_, v, patch_);
   });
 }
 

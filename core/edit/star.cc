@@ -126,6 +126,15 @@ absl::Status CheckNotDegenerate(const Mesh& mesh, const Star& star) {
   return status;
 }
 
+absl::Status CheckTetrahedra(const Mesh& mesh, absl::Span<const CellId> cells) {
+  for (CellId c : cells) {
+    if (mesh.Type(c) == ElementType::kTetrahedron) continue;
+    return Refuse(reason::kNotSimplex, absl::StrCat("cell ", c.slot(), " is no tetrahedron"),
+                  EntityKind::kCell, {c.slot()});
+  }
+  return absl::OkStatus();
+}
+
 std::array<VertexId, 2> EndsFrom(const Mesh& mesh, EdgeId e, VertexId origin) {
   const auto ends = mesh.Vertices(e);
   return ends[1] == origin ? std::array<VertexId, 2>{ends[1], ends[0]}

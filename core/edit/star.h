@@ -33,6 +33,9 @@ void ForEachElement(const Star& star, Fn fn) {
 /// FAILED_PRECONDITION DEGENERATE_ELEMENT naming an element that names a vertex twice, if there is one.
 absl::Status CheckNotDegenerate(const Mesh& mesh, const Star& star);
 
+/// FAILED_PRECONDITION NOT_SIMPLEX naming a cell of another type, if there is one.
+absl::Status CheckTetrahedra(const Mesh& mesh, absl::Span<const CellId> cells);
+
 /// Whether a face, or another one of the same vertices, is an element.
 bool HasElementAt(const Mesh& mesh, FaceId f);
 

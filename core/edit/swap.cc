@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <array>
-#include <limits>
 #include <vector>
 
 #include "absl/container/inlined_vector.h"
 #include "absl/strings/str_cat.h"
 #include "core/edit/geometry.h"
+#include "core/edit/ring_triangulation.h"
 #include "core/edit/star.h"
 
 namespace dynmesh {
@@ -81,15 +81,6 @@ struct Ring {
   absl::InlinedVector<CellId, 8> cells;
 };
 
-absl::Status CheckTetrahedra(const Mesh& mesh, absl::Span<const CellId> cells) {
-  for (CellId c : cells) {
-    if (mesh.Type(c) == ElementType::kTetrahedron) continue;
-    return Refuse(reason::kNotSimplex, absl::StrCat("cell ", c.slot(), " is no tetrahedron"),
-                  EntityKind::kCell, {c.slot()});
-  }
-  return absl::OkStatus();
-}
-
 absl::Status CheckFacesRound(const Mesh& mesh, EdgeId e) {
   for (FaceId f : mesh.IncidentFaces(e)) {
     if (mesh.IsElement(f)) {
@@ -124,51 +115,38 @@ absl::StatusOr<Ring> RingRound(const Mesh& mesh, EdgeId e, absl::Span<const Cell
   return ring;
 }
 
-/// The triangulation of a ring that makes the worst new tetrahedron best.
-class RingTriangulation {
+/// The pairs of tetrahedra between the triangles of a ring and the two ends of the edge that it surrounds.
+class RingFiller {
  public:
-  RingTriangulation(const Mesh& mesh, VertexId a, VertexId b, absl::Span<const VertexId> ring,
-                    int orientation)
-      : mesh_(mesh), a_(a), b_(b), ring_(ring), orientation_(orientation), best_(ring.size() * ring.size()) {}
+  RingFiller(const Mesh& mesh, EdgeId e, absl::Span<const VertexId> ring, int orientation)
+      : mesh_(mesh),
+        a_(mesh.Vertices(e)[0]),
+        b_(mesh.Vertices(e)[1]),
+        ring_(ring),
+        orientation_(orientation) {}
 
-  /// False when every triangulation needs an edge or face that is there already.
-  bool Find() {
-    const size_t n = ring_.size();
-    for (size_t span = 2; span < n; ++span) {
-      for (size_t i = 0; i + span < n; ++i) FindBetween(i, i + span);
-    }
-    return At(0, n - 1).quality > kForbidden;
+  /// Finds the triangulation that makes the worst new tetrahedron best, and adds its tetrahedra. False when
+  /// every one needs an edge or face that is there already.
+  bool Fill(Patch& patch) const {
+    RingTriangulation triangulation(ring_.size(), RingTriangulation::Aim::kBestWorst);
+    const bool found = triangulation.Find(
+        [this](size_t i, size_t j) { return !mesh_.FindEdge(ring_[i], ring_[j]).valid(); },
+        [this](const RingTriangulation::Triangle& triangle) { return QualityOf(triangle); });
+    if (!found) return false;
+    triangulation.ForEach([&](const RingTriangulation::Triangle& triangle) {
+      const auto [i, k, j] = triangle;
+      patch.AddChildOf(i, ElementType::kTetrahedron, {ring_[i], ring_[k], ring_[j], b_});
+      patch.AddChildOf(i, ElementType::kTetrahedron, {ring_[i], ring_[j], ring_[k], a_});
+    });
+    return true;
   }
-
-  void AddTo(Patch& patch) const { AddBetween(0, ring_.size() - 1, patch); }
 
  private:
-  static constexpr double kForbidden = -2;  ///< below the quality of any inverted tetrahedron
-
-  /// Of the polygon between two vertices of the ring and their chord.
-  struct Best {
-    double quality = 1;
-    size_t apex = 0;
-  };
-
-  Best& At(size_t i, size_t j) { return best_[i * ring_.size() + j]; }
-  const Best& At(size_t i, size_t j) const { return best_[i * ring_.size() + j]; }
-
-  void FindBetween(size_t i, size_t j) {
-    Best best{kForbidden, i + 1};
-    const bool chord = !(i == 0 && j + 1 == ring_.size());
-    const bool taken = chord && mesh_.FindEdge(ring_[i], ring_[j]).valid();
-    for (size_t k = i + 1; k < j && !taken; ++k) {
-      const double rest = std::min(At(i, k).quality, At(k, j).quality);
-      if (rest <= best.quality) continue;
-      const double quality = std::min(rest, QualityOf(i, k, j));
-      if (quality > best.quality) best = {quality, k};
+  double QualityOf(const RingTriangulation::Triangle& triangle) const {
+    const auto [i, k, j] = triangle;
+    if (ring_.size() == 3 && mesh_.FindFace({ring_[i], ring_[k], ring_[j]}).valid()) {
+      return RingTriangulation::kForbidden;
     }
-    At(i, j) = best;
-  }
-
-  double QualityOf(size_t i, size_t k, size_t j) const {
-    if (ring_.size() == 3 && mesh_.FindFace({ring_[i], ring_[k], ring_[j]}).valid()) return kForbidden;
     return std::min(SignedQuality({ring_[i], ring_[k], ring_[j], b_}),
                     SignedQuality({ring_[i], ring_[j], ring_[k], a_}));
   }
@@ -180,20 +158,10 @@ class RingTriangulation {
     return Orientation(ElementType::kTetrahedron, points) == orientation_ ? quality : -quality;
   }
 
-  void AddBetween(size_t i, size_t j, Patch& patch) const {
-    if (j < i + 2) return;
-    const size_t k = At(i, j).apex;
-    patch.AddChildOf(i, ElementType::kTetrahedron, {ring_[i], ring_[k], ring_[j], b_});
-    patch.AddChildOf(i, ElementType::kTetrahedron, {ring_[i], ring_[j], ring_[k], a_});
-    AddBetween(i, k, patch);
-    AddBetween(k, j, patch);
-  }
-
   const Mesh& mesh_;
   const VertexId a_, b_;
   const absl::Span<const VertexId> ring_;
   const int orientation_;
-  std::vector<Best> best_;
 };
 
 /// Of the first of some tetrahedra that is not flat; 0 when all are.
@@ -219,14 +187,11 @@ absl::Status PlanRemoveEdge(const Mesh& mesh, EdgeId e, absl::Span<const CellId>
   if (n < 3) return RefuseEdge(reason::kNonManifoldEdge, "has two cells that share two faces", e);
   patch.orientation = OrientationOf(mesh, cells);
   patch.work += n * n * n;
-  RingTriangulation triangulation(mesh, mesh.Vertices(e)[0], mesh.Vertices(e)[1], ring.vertices,
-                                  patch.orientation);
-  if (!triangulation.Find()) {
+  for (CellId c : ring.cells) patch.Remove(c);
+  if (!RingFiller(mesh, e, ring.vertices, patch.orientation).Fill(patch)) {
     return n == 3 ? RefuseEdge(reason::kFaceExists, "has a ring that is a face already", e)
                   : RefuseEdge(reason::kEdgeExists, "has a ring whose vertices are joined already", e);
   }
-  for (CellId c : ring.cells) patch.Remove(c);
-  triangulation.AddTo(patch);
   return absl::OkStatus();
 }
 

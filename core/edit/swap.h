@@ -16,15 +16,14 @@ namespace dynmesh {
 ///                                       from a and from b (4-4, and general edge removal)
 ///
 /// "Best": the smallest Quality of the new tetrahedra is largest; found by dynamic programming over the ring
-/// (Klincsek; Shewchuk, "Two discrete optimization algorithms for the topological improvement of tetrahedral
-/// meshes", 2002).
+/// (ring_triangulation.h; Shewchuk, "Two discrete optimization algorithms for the topological improvement of
+/// tetrahedral meshes", 2002).
 /// Errors: FAILED_PRECONDITION BOUNDARY (one triangle, or the ring is open), NON_MANIFOLD_EDGE (more than two
 /// triangles, more than one ring, triangles and cells at the same edge), NOT_SIMPLEX, ELEMENT_IN_THE_WAY (the
 /// edge or a face at it is an element beside cells), EDGE_EXISTS / FACE_EXISTS (what it would make is there:
-/// no triangulation is left), INCONSISTENT_ORIENTATION, TOO_MANY_ELEMENTS (more than kMaxRing),
-/// DEGENERATE_ELEMENT. REQUIRES: `e` is live. Cost: O(n^3).
+/// no triangulation is left), INCONSISTENT_ORIENTATION, TOO_MANY_ELEMENTS (more than kMaxRing of
+/// ring_triangulation.h), DEGENERATE_ELEMENT. REQUIRES: `e` is live. Cost: O(n^3).
 absl::Status PlanSwapEdge(const Mesh& mesh, EdgeId e, Patch& patch);
-inline constexpr size_t kMaxRing = 24;
 
 /// Removes a face between two tetrahedra and joins the vertices across it by an edge (2-3).
 /// Errors: FAILED_PRECONDITION BOUNDARY, NON_MANIFOLD_FACE, NOT_SIMPLEX, ELEMENT_IN_THE_WAY, EDGE_EXISTS,

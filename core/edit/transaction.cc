@@ -1,8 +1,6 @@
 #include "core/edit/transaction.h"
 
 #include <algorithm>
-#include <new>
-#include <stdexcept>
 #include <string>
 
 #include "absl/strings/str_cat.h"
@@ -10,8 +8,8 @@
 #include "core/edit/batch_names.h"
 #include "core/edit/convert_rows.h"
 #include "core/edit/operator_runner.h"
+#include "core/edit/run_batch.h"
 #include "core/mesh/spatial_order.h"
-#include "core/mesh/validate.h"
 #include "core/mesh/vector.h"
 
 namespace dynmesh {
@@ -188,44 +186,20 @@ absl::Status ApplyAll(Mesh& mesh, absl::Span<const Edit> edits, const BatchOptio
   return absl::OkStatus();
 }
 
-/// Memory that runs out in the middle is a refusal like others, if the mesh can be put back.
-absl::Status TryApplyAll(Mesh& mesh, absl::Span<const Edit> edits, const BatchOptions& options,
-                         BatchResult& result, bool& ran_out) try {
-  return ApplyAll(mesh, edits, options, result);
-} catch (const std::bad_alloc&) {
-  ran_out = true;
-  return MakeError(absl::StatusCode::kResourceExhausted, reason::kLimitExceeded, "memory ran out",
-                   {{"limit", "memory"}});
-}
-
-/// Puts the mesh back. Where an allocation failed, an entity may have been left half made, which no journal
-/// knows: then all of the mesh is looked at, and one that is damaged is not kept in service.
-void PutBack(Mesh& mesh, bool ran_out) {
-  mesh.Rollback();
-  if (ran_out && !Validate(mesh, {.max_violations = 1}).empty()) {
-    throw std::runtime_error("memory ran out in the middle of an edit");
-  }
-}
-
 }  // namespace
 
 absl::StatusOr<BatchResult> ApplyBatch(Mesh& mesh, absl::Span<const Edit> edits,
                                        const BatchOptions& options) {
   BatchResult result;
-  mesh.BeginBatch();
-  bool ran_out = false;
-  absl::Status status = TryApplyAll(mesh, edits, options, result, ran_out);
-  if (!status.ok()) {
-    PutBack(mesh, ran_out);
-    return status;
-  }
+  const absl::Status applied = RunInBatch(mesh, [&] { return ApplyAll(mesh, edits, options, result); });
+  if (!applied.ok()) return applied;
   result.checksum = mesh.checksum();
   for (EntityKind kind : kEntityKinds) result.counts[Dimension(kind)] = mesh.NumLive(kind);
   if (options.dry_run || edits.empty()) {
     mesh.Rollback();
-  } else if (status = mesh.Commit(); !status.ok()) {
+  } else if (const absl::Status committed = mesh.Commit(); !committed.ok()) {
     mesh.Rollback();
-    return status;
+    return committed;
   }
   result.revision = mesh.revision();
   return result;

@@ -58,6 +58,7 @@ inline constexpr char kLinkCondition[] = "LINK_CONDITION";  // parts would merge
 inline constexpr char kBoundary[] = "BOUNDARY";  // only possible inside, or would close the boundary
 inline constexpr char kNonManifoldEdge[] = "NON_MANIFOLD_EDGE";
 inline constexpr char kNonManifoldFace[] = "NON_MANIFOLD_FACE";
+inline constexpr char kNonManifoldVertex[] = "NON_MANIFOLD_VERTEX";  // more than one fan of elements
 inline constexpr char kNotSimplex[] = "NOT_SIMPLEX";  // only defined for triangles and tetrahedra
 inline constexpr char kDegenerateElement[] = "DEGENERATE_ELEMENT";  // an element there names a vertex twice
 inline constexpr char kElementInTheWay[] = "ELEMENT_IN_THE_WAY";  // a wire or dangling face would have to go

@@ -121,6 +121,13 @@ absl::StatusOr<Edit> ToEdit(const v1::MergeVertices& message) {
   return edit;
 }
 
+absl::StatusOr<Edit> ToEdit(const v1::DissolveVertices& message) {
+  DissolveVerticesEdit edit;
+  DYNMESH_ASSIGN_OR_RETURN(edit.vertices, ToArray<Slot>(message.ids(), "ids"));
+  edit.limits = ToPatchLimits(message.limits());
+  return edit;
+}
+
 absl::StatusOr<Edit> ToEdit(const v1::Edit& message) {
   switch (message.kind_case()) {
     case v1::Edit::kAddVertices:
@@ -149,6 +156,8 @@ absl::StatusOr<Edit> ToEdit(const v1::Edit& message) {
       return ToEdit(message.split_elements());
     case v1::Edit::kMergeVertices:
       return ToEdit(message.merge_vertices());
+    case v1::Edit::kDissolveVertices:
+      return ToEdit(message.dissolve_vertices());
     case v1::Edit::KIND_NOT_SET:
       break;
   }

@@ -53,6 +53,10 @@ struct EditVisitor {
     fingerprint.AddArray(edit.positions);
     Add(edit.limits);
   }
+  void operator()(const DissolveVerticesEdit& edit) {
+    fingerprint.AddArray(edit.vertices);
+    Add(edit.limits);
+  }
 
   template <typename EdgesEdit>
   void AddPlaced(const EdgesEdit& edit) {

@@ -10,6 +10,7 @@
 #include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
 #include "absl/time/clock.h"
+#include "core/edit/run_batch.h"
 #include "core/mesh/error.h"
 #include "server/session/catch_exceptions.h"
 #include "server/session/fingerprint.h"
@@ -198,15 +199,51 @@ absl::StatusOr<Session::AnswerPtr> Session::ApplyLocked(absl::Span<const Edit> e
     returned = true;
     return applied;
   });
-  if (!returned) {
-    spdlog::error("session_damaged name={} error=\"{}\"", name(), result.status().ToString());
-    gone_ = SessionDamaged(name());
-    return gone_;
-  }
+  if (!returned) return Damage(result.status());
   if (!result.ok()) return result.status();
   items_since_check_ += result->num_made;
   if (!options.validate_only) Committed();
   return std::make_shared<const BatchResult>(*std::move(result));
+}
+
+absl::Status Session::Damage(const absl::Status& failure) {
+  spdlog::error("session_damaged name={} error=\"{}\"", name(), failure.ToString());
+  gone_ = SessionDamaged(name());
+  return gone_;
+}
+
+absl::Status Session::EditMesh(absl::FunctionRef<absl::StatusOr<BatchEnding>(Mesh&)> edit,
+                               absl::FunctionRef<void(const Mesh&)> ended) {
+  BatchEnding ending;
+  {
+    WriterMutexLock lock(&mu_);
+    DYNMESH_RETURN_IF_ERROR(gone_);
+    DYNMESH_ASSIGN_OR_RETURN(ending, EditLocked(edit));
+    if (ending == BatchEnding::kCommit) Committed();
+    ended(mesh_);
+  }
+  if (ending == BatchEnding::kCommit) followers_.Wake();
+  return absl::OkStatus();
+}
+
+absl::StatusOr<BatchEnding> Session::EditLocked(
+    absl::FunctionRef<absl::StatusOr<BatchEnding>(Mesh&)> edit) {
+  bool returned = false;
+  const absl::StatusOr<BatchEnding> ending = CatchExceptions([&]() -> absl::StatusOr<BatchEnding> {
+    absl::StatusOr<BatchEnding> wanted;
+    absl::Status status = RunInBatch(mesh_, [&] { return (wanted = edit(mesh_)).status(); });
+    if (status.ok()) {
+      if (*wanted == BatchEnding::kCommit) status = mesh_.Commit();
+      if (*wanted == BatchEnding::kRollBack || !status.ok()) mesh_.Rollback();
+    }
+    returned = true;
+    return status.ok() ? wanted : status;
+  });
+  if (!returned) return Damage(ending.status());
+  if (!ending.ok()) return ending;
+  items_since_check_ = kItemsBetweenChecks;
+  MakeRoom(mesh_.memory_bytes());
+  return ending;
 }
 
 absl::Status Session::CheckRevisions(const ApplyOptions& options) const {
@@ -289,6 +326,18 @@ void Session::RememberImport(const std::string& request_id, uint64_t fingerprint
                              std::shared_ptr<const ImportOutcome> outcome) {
   MutexLock lock(&imports_mu_);
   imports_.Remember(request_id, fingerprint, std::move(outcome), 0);
+}
+
+absl::StatusOr<std::shared_ptr<const RepairOutcome>> Session::FindRepair(absl::string_view request_id,
+                                                                         uint64_t fingerprint) const {
+  MutexLock lock(&repairs_mu_);
+  return repairs_.Find(request_id, fingerprint);
+}
+
+void Session::RememberRepair(const std::string& request_id, uint64_t fingerprint,
+                             std::shared_ptr<const RepairOutcome> outcome, size_t bytes) {
+  MutexLock lock(&repairs_mu_);
+  repairs_.Remember(request_id, fingerprint, std::move(outcome), bytes);
 }
 
 absl::StatusOr<int64_t> Session::Delete(absl::string_view etag) {

@@ -51,6 +51,12 @@ struct SessionView {
 /// What an import gave, and what a retry of it gets again.
 struct ImportOutcome;
 
+/// The same of a repair.
+struct RepairOutcome;
+
+/// What becomes of a batch.
+enum class BatchEnding { kCommit, kRollBack };
+
 /// INVALID_ARGUMENT BAD_SESSION_NAME unless `name` is 1-64 of [A-Za-z0-9_.-] and starts with a letter or
 /// digit.
 absl::Status CheckSessionName(absl::string_view name);
@@ -122,11 +128,26 @@ class Session : public std::enable_shared_from_this<Session> {
                                                            const ApplyOptions& options)
       ABSL_LOCKS_EXCLUDED(mu_);
 
+  /// Edits the mesh in whatever way, as one revision: calls edit(mesh) in an open batch, which then ends as that
+  /// says, and then ended(mesh), both under the writer lock. For what is no list of edits. An edit that takes
+  /// long must see itself that it stays within memory and that somebody waits for it (MeshMeter).
+  /// Errors: those of edit; RESOURCE_EXHAUSTED. Nothing changed then, and ended is not called.
+  absl::Status EditMesh(absl::FunctionRef<absl::StatusOr<BatchEnding>(Mesh&)> edit,
+                        absl::FunctionRef<void(const Mesh&)> ended) ABSL_LOCKS_EXCLUDED(mu_);
+
   /// What the import `request_id` gave, nullptr if there was none. Errors: INVALID_ARGUMENT
   /// REQUEST_ID_REUSED. Never waits.
   absl::StatusOr<std::shared_ptr<const ImportOutcome>> FindImport(absl::string_view request_id,
                                                                   uint64_t fingerprint) const
       ABSL_LOCKS_EXCLUDED(imports_mu_);
+
+  /// FindImport and RememberImport for repairs.
+  absl::StatusOr<std::shared_ptr<const RepairOutcome>> FindRepair(absl::string_view request_id,
+                                                                  uint64_t fingerprint) const
+      ABSL_LOCKS_EXCLUDED(repairs_mu_);
+  void RememberRepair(const std::string& request_id, uint64_t fingerprint,
+                      std::shared_ptr<const RepairOutcome> outcome, size_t bytes)
+      ABSL_LOCKS_EXCLUDED(repairs_mu_);
 
   /// Stores just the relations of `wanted`; no revision is made. All or nothing. Takes the writer lock for as
   /// long as that takes. Errors: those of StoreJust; ABORTED ETAG_MISMATCH (an empty `etag` fits any).
@@ -163,6 +184,10 @@ class Session : public std::enable_shared_from_this<Session> {
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
   absl::StatusOr<AnswerPtr> ApplyOnce(absl::Span<const Edit> edits, const ApplyOptions& options,
                                       uint64_t fingerprint) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
+  absl::StatusOr<BatchEnding> EditLocked(absl::FunctionRef<absl::StatusOr<BatchEnding>(Mesh&)> edit)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
+  /// Ends this after a failure half way of an edit.
+  absl::Status Damage(const absl::Status& failure) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
   absl::Status CheckMemory(absl::Span<const Edit> edits) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
   /// An index can be made again: it goes when the mesh needs its room.
   void MakeRoom(uint64_t mesh_bytes) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
@@ -186,6 +211,9 @@ class Session : public std::enable_shared_from_this<Session> {
 
   mutable Mutex imports_mu_;
   AnswerMemory<ImportOutcome> imports_ ABSL_GUARDED_BY(imports_mu_);
+
+  mutable Mutex repairs_mu_;
+  AnswerMemory<RepairOutcome> repairs_ ABSL_GUARDED_BY(repairs_mu_);
 
   mutable SummaryCache summary_;
   mutable SharedSpatialIndex spatial_;

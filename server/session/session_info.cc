@@ -4,6 +4,7 @@
 
 #include "core/mesh/error.h"
 #include "server/session/catch_exceptions.h"
+#include "server/session/mesh_meter.h"
 
 namespace dynmesh {
 namespace {
@@ -24,26 +25,8 @@ bool Contains(absl::Span<const Relation> relations, Relation relation) {
   return std::find(relations.begin(), relations.end(), relation) != relations.end();
 }
 
-/// Lets tables be made as long as the mesh stays within its limit and somebody waits for them.
-class StoreMeter final : public WorkMeter {
- public:
-  StoreMeter(uint64_t used_bytes, uint64_t max_bytes, const StopSignal& stop)
-      : bytes_(used_bytes), max_bytes_(max_bytes), stop_(stop) {}
-
-  absl::Status ChargeSteps(uint64_t) override { return stop_.Check(); }
-  absl::Status ChargeBytes(uint64_t bytes) override {
-    bytes_ += bytes;
-    return bytes_ <= max_bytes_ ? absl::OkStatus() : LimitExceeded("max_session_bytes", max_bytes_, bytes_);
-  }
-
- private:
-  uint64_t bytes_;
-  const uint64_t max_bytes_;
-  const StopSignal& stop_;
-};
-
 /// Switches on what is wanted and not stored, and tells what that was.
-absl::Status SwitchOn(Mesh& mesh, absl::Span<const Relation> wanted, StoreMeter& meter,
+absl::Status SwitchOn(Mesh& mesh, absl::Span<const Relation> wanted, MeshMeter& meter,
                       std::vector<Relation>& switched) {
   for (Relation relation : wanted) {
     if (mesh.stored().Has(relation)) continue;
@@ -82,7 +65,7 @@ std::vector<Relation> StoredRelationsOf(const Mesh& mesh) {
 absl::Status StoreJust(Mesh& mesh, absl::Span<const Relation> wanted, uint64_t max_bytes,
                        const StopSignal& stop) {
   std::vector<Relation> switched;
-  StoreMeter meter(mesh.memory_bytes(), max_bytes, stop);
+  MeshMeter meter({mesh.memory_bytes(), max_bytes}, stop);
   const absl::Status status = CatchExceptions([&] { return SwitchOn(mesh, wanted, meter, switched); });
   for (Relation relation : status.ok() ? StoredRelationsOf(mesh) : switched) {
     // Switching off cannot fail.

@@ -44,6 +44,23 @@ def mesh_file(tmp_path):
     return tmp_path / "tets.vtu"
 
 
+def test_a_repair_tells_what_it_did_and_a_dry_run_what_it_would_do(run, tmp_path):
+    points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 0], [1, 0, 0], [0, -1, 0], [9, 9, 9]], dtype=float)
+    meshio.write_points_cells(tmp_path / "halves.vtu", points, {"triangle": np.array([[0, 1, 2], [3, 5, 4]])})
+    assert run("create", "halves", tmp_path / "halves.vtu").returncode == 0
+    options = ("--weld", "1e-9", "--remove-isolated", "--split-non-manifold", "--orient", "--fill-holes", "3")
+    dry = json.loads(run("repair", "halves", *options, "--dry-run", "--json").stdout)
+    assert (dry["revision"], dry["steps"][0]["merged"]["ids"]) == (1, [3, 4])
+    done = json.loads(run("repair", "halves", *options, "--json").stdout)
+    assert (done["revision"], done["steps"]) == (2, dry["steps"])
+    assert done["counts"] == {"vertices": 4, "edges": 5, "faces": 2, "cells": 0}
+    text = run("repair", "halves", "--orient", "--fill-holes", "3").stdout
+    assert text == "revision 2\norient: nothing\nfill holes: 1 hole too long\norient: nothing\n"
+    refused = run("repair", "halves", "--weld", "-1")
+    assert refused.returncode != 0 and "Traceback" not in refused.stderr
+    run("rm", "halves")
+
+
 def test_a_mesh_through_the_command_and_out_again(run, mesh_file, tmp_path):
     created = run("create", "cli", mesh_file, "--json")
     assert created.returncode == 0, created.stderr

@@ -111,6 +111,18 @@ def test_two_tetrahedra_are_welded_at_a_face(session):
             tx.merge_vertices([[0, 1]])
 
 
+def test_a_dissolved_vertex_leaves_its_ring_triangulated(session):
+    ring = [[np.cos(t), np.sin(t), 0] for t in np.arange(6) * np.pi / 3]
+    session.import_mesh(np.array([[0, 0, 0], *ring]), {"triangle": [[0, 1 + i, 1 + (i + 1) % 6] for i in range(6)]})
+    with session.edit(report_lineage=True) as tx:
+        edit = tx.dissolve_vertices([0])
+    assert (session.counts.vertices, session.counts.faces) == (6, 4)
+    assert len(tx.result.lineage[edit].elements) == 4
+    with pytest.raises(dynmesh.FailedPreconditionError, match="FACE_EXISTS|EDGE_EXISTS|WOULD_CHANGE_TOPOLOGY"):
+        with session.edit() as tx:
+            tx.dissolve_vertices(list(range(1, 7)))
+
+
 def test_errors_name_the_item(session):
     with pytest.raises(dynmesh.InvalidArgumentError) as refused:
         dynmesh.EditBatch().split_edges(ends=[[0, 1], [0, -1]])

@@ -35,7 +35,7 @@ class Dice {
 
   Edit AnyOperator() {
     const bool crowded = NumElements() > kMaxElements;
-    switch (crowded ? 1 + Uniform(2) : Uniform(6)) {
+    switch (crowded ? 1 + Uniform(2) : Uniform(7)) {
       case 0:
         return SplitEdgesEdit{AnyEdges(), Parameters(0.1, 0.8), {}, AnyLimits()};
       case 1:
@@ -49,6 +49,8 @@ class Dice {
         const EntityKind kind = kEntityKinds[1 + Uniform(3)];
         return SplitElementsEdit{kind, {Any(kind)}, {}, AnyLimits()};
       }
+      case 5:
+        return DissolveVerticesEdit{{Any(EntityKind::kVertex)}, AnyLimits()};
       default: {
         const Slot kept = Any(EntityKind::kVertex);  // with itself would be the caller's mistake
         return MergeVerticesEdit{{kept, kept + 1 + Uniform(5)}, {}, AnyLimits()};

@@ -45,6 +45,7 @@ from .mirror import Elements, Mirror, Update
 from .mirror_stats import MirrorStats
 from .places import Located, NearestVertices, RayHits
 from .queries import Csr, Entities, Surface
+from .repairs import RepairFinding, RepairResult, RepairStepResult
 from .session import Session
 from .snapshot import Attribute, Block, Snapshot
 from .transfer import ImportResult
@@ -92,6 +93,9 @@ __all__ = [
     "PermissionDeniedError",
     "RayHits",
     "Refusal",
+    "RepairFinding",
+    "RepairResult",
+    "RepairStepResult",
     "ResourceExhaustedError",
     "Session",
     "SessionInfo",

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from .cli_query import add_questions
+from .cli_repair import add_repair_options, describe_repair, repair, repair_record
 from .cli_watch import watch
 from .client import DEFAULT_TARGET, DEFAULT_TIMEOUT_S, Client, connect
 from .daemon import find_daemon
@@ -119,6 +120,10 @@ def _add_writing(commands: Any) -> None:
         type=_relation,
         help="cell-edge, vertex-cell, edge-cell, vertex-face, cell-cell, vertex-vertex; or none",
     )
+    help_text = "Repair a session, as one revision: the steps in the order in which they are listed."
+    mend = _command(commands, "repair", _repair, help_text)
+    mend.add_argument("name", metavar="NAME")
+    add_repair_options(mend)
     remove = _command(commands, "rm", _rm, "Delete a session. Asks first when typed at a terminal.")
     remove.add_argument("name", metavar="NAME")
     remove.add_argument("--yes", action="store_true", help="do not ask")
@@ -217,6 +222,12 @@ def _store(args: argparse.Namespace) -> None:
     with _client(args) as client:
         wanted = [relation for relation in args.relations if relation is not None]
         _print_info(args, client.session(args.name).store_relations(wanted))
+
+
+def _repair(args: argparse.Namespace) -> None:
+    with _client(args) as client:
+        result = repair(client.session(args.name), args)
+    _print(args, repair_record(result), describe_repair(result))
 
 
 def _export(args: argparse.Namespace) -> None:

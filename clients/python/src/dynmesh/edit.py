@@ -285,6 +285,24 @@ class EditBatch:
         )
         return self._append(merge_vertices=message)
 
+    def dissolve_vertices(
+        self, ids: ArrayLike, *, allow_inversion: bool = False, min_quality: float = 0.0
+    ) -> int:
+        """Removes vertices and fills the gaps anew, without new ones; returns the edit's index.
+
+        Triangles round a vertex: the best triangulation of the ring of their other corners. Two wires become one.
+        Tetrahedra: the best collapse onto a neighbour. See `remove_vertices` for vertices that nothing uses.
+
+        Parameters
+        ----------
+        ids : uint32[n]
+            Ids or handles of this batch.
+        """
+        message = edits_pb2.DissolveVertices(
+            ids=u32_bytes(as_ids(self._wire(ids))), limits=_limits(allow_inversion, min_quality)
+        )
+        return self._append(dissolve_vertices=message)
+
     def edits(self) -> list[edits_pb2.Edit]:
         """The edits so far, as messages."""
         return list(self._edits)

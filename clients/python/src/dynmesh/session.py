@@ -24,9 +24,18 @@ from .mirror import Mirror, Update
 from .mirror_state import MirrorState
 from .progress import Progress
 from .relations import RelationLike, relations_to_proto
+from .repairs import RepairResult, RepairStep, choose_steps, read_repair
 from .session_reader import FOREVER, SessionReader
 from .transfer import ImportResult, import_requests, read_import
-from .v1 import edits_pb2, edits_pb2_grpc, sessions_pb2, subscriptions_pb2, subscriptions_pb2_grpc
+from .v1 import (
+    edits_pb2,
+    edits_pb2_grpc,
+    repairs_pb2,
+    repairs_pb2_grpc,
+    sessions_pb2,
+    subscriptions_pb2,
+    subscriptions_pb2_grpc,
+)
 
 if TYPE_CHECKING:
     import meshio
@@ -53,6 +62,7 @@ class Session(SessionReader):
     def __init__(self, name: str, channel: grpc.Channel, caller: Caller) -> None:
         super().__init__(name, channel, caller)
         self._edits = edits_pb2_grpc.EditServiceStub(channel)
+        self._repairs = repairs_pb2_grpc.RepairServiceStub(channel)
         self._subscriptions = subscriptions_pb2_grpc.SubscriptionServiceStub(channel)
 
     def __repr__(self) -> str:
@@ -257,6 +267,63 @@ class Session(SessionReader):
             )
 
         return EditStream(self._edits.StreamEdits, make_request, window, self._caller.check_size)
+
+    def repair(
+        self,
+        steps: Iterable[RepairStep] = (),
+        *,
+        weld: float | None = None,
+        remove_duplicates: bool = False,
+        split_non_manifold: bool = False,
+        orient: bool = False,
+        fill_holes: int | None = None,
+        if_revision: int | None = None,
+        request_id: str | None = None,
+        validate_only: bool = False,
+        progress: bool | None = None,
+        timeout: float | None = None,
+    ) -> RepairResult:
+        """Repairs the mesh as one revision, all or nothing; without one where nothing has to be changed.
+
+        Nobody else can edit the session meanwhile. An interruption ends it without a change.
+
+        Parameters
+        ----------
+        steps : iterable of Orient, Weld, RemoveDuplicates, SplitNonManifold, FillHoles
+            From `dynmesh.repairs`: taken in this order, each on what the one before left.
+        weld : float, optional
+        remove_duplicates, split_non_manifold, orient : bool
+        fill_holes : int, optional
+            Instead of `steps`: those that are named, with their defaults, in this order, and `orient` once more
+            after holes were filled, as surfaces that are closed can be made to face outwards.
+        if_revision, request_id, validate_only
+            As in `edit`.
+        timeout : float, optional
+            Default: none, as it takes as long as it takes.
+
+        Examples
+        --------
+        >>> result = session.repair(weld=1e-6, split_non_manifold=True, orient=True, fill_holes=20)
+        >>> result.count("merged"), result.steps[2].findings["not_orientable"].ids
+        """
+        chosen = choose_steps(
+            steps,
+            weld=weld,
+            remove_duplicates=remove_duplicates,
+            split_non_manifold=split_non_manifold,
+            orient=orient,
+            fill_holes=fill_holes,
+        )
+        request = repairs_pb2.RepairSessionRequest(
+            session=self.name,
+            steps=[step.to_proto() for step in chosen],
+            if_revision=None if if_revision is None else as_int64(if_revision, "if_revision"),
+            request_id=request_id or _new_request_id(),
+            validate_only=validate_only,
+        )
+        seconds = FOREVER if timeout is None else timeout
+        with Progress("repairing", progress) as bar:
+            return read_repair(self._caller.stream(self._repairs.RepairSession, request, seconds), chosen, bar)
 
     # ---- Following ----
 

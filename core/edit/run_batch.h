@@ -1,0 +1,22 @@
+#ifndef DYNMESH_CORE_EDIT_RUN_BATCH_H_
+#define DYNMESH_CORE_EDIT_RUN_BATCH_H_
+
+#include "absl/functional/function_ref.h"
+#include "absl/status/status.h"
+#include "core/mesh/mesh.h"
+
+namespace dynmesh {
+
+/// Begins a batch and calls fn(), which edits `mesh`. The batch is open after success; after an error, also
+/// RESOURCE_EXHAUSTED when memory ran out in fn(), the mesh is as it was.
+/// Throws std::runtime_error when memory ran out and the mesh could not be put back: it is damaged then.
+/// REQUIRES: no batch is open.
+absl::Status RunInBatch(Mesh& mesh, absl::FunctionRef<absl::Status()> fn);
+
+/// Mesh::RollbackTo within fn() of RunInBatch. Memory that runs out here leaves a mesh that nobody can put
+/// back: no refusal, but std::runtime_error.
+void PutBackTo(Mesh& mesh, Mesh::Savepoint savepoint);
+
+}  // namespace dynmesh
+
+#endif  // DYNMESH_CORE_EDIT_RUN_BATCH_H_
