@@ -180,10 +180,33 @@ absl::Status ApplyAll(Mesh& mesh, absl::Span<const Edit> edits, const BatchOptio
   return absl::OkStatus();
 }
 
+/// Counts what a checker looks at.
+class CheckMeter final : public WorkMeter {
+ public:
+  explicit CheckMeter(uint64_t max_work) : max_work_(max_work) {}
+
+  absl::Status ChargeSteps(uint64_t steps) override {
+    work_ += steps;
+    return work_ <= max_work_ ? absl::OkStatus() : LimitExceeded("max_batch_work", max_work_, work_);
+  }
+  absl::Status ChargeBytes(uint64_t) override { return absl::OkStatus(); }
+
+ private:
+  const uint64_t max_work_;
+  uint64_t work_ = 0;
+};
+
+absl::Status CheckAll(const Mesh& mesh, const BatchOptions& options, BatchResult& result) {
+  if (options.checker == nullptr) return absl::OkStatus();
+  CheckMeter meter(options.max_work);
+  return options.checker->Check(mesh, meter, result.warnings);
+}
+
 /// Memory that runs out in the middle is a refusal like others, if the mesh can be put back.
 absl::Status TryApplyAll(Mesh& mesh, absl::Span<const Edit> edits, const BatchOptions& options,
                          BatchResult& result, bool& ran_out) try {
-  return ApplyAll(mesh, edits, options, result);
+  DYNMESH_RETURN_IF_ERROR(ApplyAll(mesh, edits, options, result));
+  return CheckAll(mesh, options, result);
 } catch (const std::bad_alloc&) {
   ran_out = true;
   return MakeError(absl::StatusCode::kResourceExhausted, reason::kLimitExceeded, "memory ran out",
