@@ -18,15 +18,15 @@ enum class CheckKind : uint8_t {
   kUnspecified = 0,
 
   // Of the shapes of elements, but for angles of faces: of all faces. No units; angles in degrees.
-  kZeroMeasure = 1,    ///< length, area or volume over that power of the longest edge
-  kInverted = 2,       ///< of cells: the smallest scaled Jacobian of a corner
-  kMinFaceAngle = 3,   ///< smallest angle inside of a face, 0 to 360
+  kZeroMeasure = 1,   ///< length, area or volume over that power of the longest edge
+  kInverted = 2,      ///< of cells: the smallest scaled Jacobian of a corner
+  kMinFaceAngle = 3,  ///< smallest angle inside of a face, 0 to 360
   kMaxFaceAngle = 4,
-  kMinDihedral = 5,    ///< smallest angle between two faces of a cell, inside of it, 0 to 360
+  kMinDihedral = 5,  ///< smallest angle between two faces of a cell, inside of it, 0 to 360
   kMaxDihedral = 6,
-  kAspectRatio = 7,    ///< AspectRatio(): 1 if regular
-  kCondition = 8,      ///< ConditionNumber(): 1 if regular
-  kQuality = 9,        ///< Quality(): 1 if regular
+  kAspectRatio = 7,  ///< AspectRatio(): 1 if regular
+  kCondition = 8,    ///< ConditionNumber(): 1 if regular
+  kQuality = 9,      ///< Quality(): 1 if regular
 
   // Of the incidences of entities. Surface faces are faces that are elements.
   kEdgeFaces = 10,       ///< surface faces at an edge
@@ -39,11 +39,11 @@ enum class CheckKind : uint8_t {
   kIsolatedVertex = 17,  ///< 1: a vertex has no edges
 
   // Of the whole mesh (summary.h).
-  kHoles = 18,         ///< loops of edges of one surface face
-  kNonOrientable = 19, ///< surfaces and bodies that cannot be oriented
-  kShells = 20,        ///< surfaces of bodies
-  kComponents = 21,    ///< parts that no edge connects
-  kGenus = 22,         ///< handles of surfaces and shells
+  kHoles = 18,          ///< loops of edges of one surface face
+  kNonOrientable = 19,  ///< surfaces and bodies that cannot be oriented
+  kShells = 20,         ///< surfaces of bodies
+  kComponents = 21,     ///< parts that no edge connects
+  kGenus = 22,          ///< handles of surfaces and shells
 };
 
 inline constexpr int kNumChecks = 22;
@@ -64,12 +64,12 @@ enum class BadSide : uint8_t { kBelow, kAbove };
 /// What is known of a check beforehand.
 struct CheckTraits {
   CheckKind check;
-  absl::string_view name;    ///< "min_dihedral"
-  BadSide bad;               ///< values on that side of the threshold
+  absl::string_view name;  ///< "min_dihedral"
+  BadSide bad;             ///< values on that side of the threshold
   double default_threshold;
-  double min_threshold;      ///< what may be asked for
+  double min_threshold;  ///< what may be asked for
   double max_threshold;
-  uint8_t kinds;             ///< of entities that it looks at: bits of Dimension(); 0: the whole mesh
+  uint8_t kinds;  ///< of entities that it looks at: bits of Dimension(); 0: the whole mesh
 };
 
 /// REQUIRES: IsCheckKind(check).

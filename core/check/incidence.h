@@ -7,8 +7,8 @@
 #include "core/mesh/mesh.h"
 #include "core/mesh/work_meter.h"
 
-/// What lies round one entity. Errors of all: those of `meter`, which is charged the entries of the lists that
-/// are gone through. REQUIRES for all: live ids.
+/// What lies round one entity. Errors of all: those of `meter`, which is charged the entries of the lists
+/// that are gone through. REQUIRES for all: live ids.
 namespace dynmesh {
 
 /// Whether a face is part of a surface: an element, neither degenerate nor a duplicate.

@@ -12,8 +12,8 @@ namespace dynmesh {
 /// What a check measures at an entity; nullopt where it says nothing: of derived entities where only elements
 /// count, of edges without surface faces, and so on. Duplicates count as elements, but not as neighbours.
 ///
-/// Errors: those of `meter`. REQUIRES: IsLocal(check), `id` is live. Cost: constant for shapes, else linear in the
-/// incidences at `id`; sorting them for links.
+/// Errors: those of `meter`. REQUIRES: IsLocal(check), `id` is live. Cost: constant for shapes, else linear
+/// in the incidences at `id`; sorting them for links.
 absl::StatusOr<absl::optional<double>> MeasureEntity(const Mesh& mesh, CheckKind check, EntityId id,
                                                      WorkMeter& meter);
 

@@ -12,18 +12,18 @@ namespace {
 absl::Status Refuse(const Tally& tally, EntityKind kind) {
   const CheckTraits& traits = TraitsOf(tally.check);
   const Findings& findings = tally.findings[Dimension(kind)];
-  const std::string value = absl::StrCat(findings.values[0]), threshold = absl::StrCat(tally.setting.threshold);
+  const std::string value = absl::StrCat(findings.values[0]),
+                    threshold = absl::StrCat(tally.setting.threshold);
   const absl::string_view side = traits.bad == BadSide::kBelow ? " is below " : " is above ";
-  return FailedPrecondition(
-      reason::kCheckFailed,
-      absl::StrCat(traits.name, " of ", EntityKindName(kind), " ", findings.slots[0], " would be ", value,
-                   ", which", side, threshold),
-      {{"check", std::string(traits.name)},
-       {"kind", std::string(EntityKindName(kind))},
-       {"ids", JoinSlots(findings.slots)},
-       {"count", absl::StrCat(findings.count)},
-       {"value", value},
-       {"threshold", threshold}});
+  return FailedPrecondition(reason::kCheckFailed,
+                            absl::StrCat(traits.name, " of ", EntityKindName(kind), " ", findings.slots[0],
+                                         " would be ", value, ", which", side, threshold),
+                            {{"check", std::string(traits.name)},
+                             {"kind", std::string(EntityKindName(kind))},
+                             {"ids", JoinSlots(findings.slots)},
+                             {"count", absl::StrCat(findings.count)},
+                             {"value", value},
+                             {"threshold", threshold}});
 }
 
 BatchWarning Warn(const Tally& tally, EntityKind kind) {

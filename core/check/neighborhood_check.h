@@ -8,16 +8,16 @@
 
 namespace dynmesh {
 
-/// Makes the local checks of some settings on what a batch has touched (Mesh::Touched), and nowhere else: what
-/// was bad elsewhere never refuses a batch. What the batch touches and leaves bad does, even where it was as bad
-/// before. Checks of the whole mesh are passed over.
+/// Makes the local checks of some settings on what a batch has touched (Mesh::Touched), and nowhere else:
+/// what was bad elsewhere never refuses a batch. What the batch touches and leaves bad does, even where it
+/// was as bad before. Checks of the whole mesh are passed over.
 ///
 ///     NeighborhoodCheck checker(settings);
 ///     ApplyBatch(mesh, edits, {.checker = &checker});
 ///
-/// Errors: FAILED_PRECONDITION CHECK_FAILED for the first check of severity kReject that fails, with metadata check
-/// (its name), kind, ids (up to 16), count, value (at the first of them) and threshold. Ids of what the batch has
-/// made are those that it would have got.
+/// Errors: FAILED_PRECONDITION CHECK_FAILED for the first check of severity kReject that fails, with metadata
+/// check (its name), kind, ids (up to 16), count, value (at the first of them) and threshold. Ids of what the
+/// batch has made are those that it would have got.
 class NeighborhoodCheck final : public BatchChecker {
  public:
   /// REQUIRES: `settings` outlive this.

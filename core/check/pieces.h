@@ -9,8 +9,8 @@
 
 namespace dynmesh {
 
-/// Items 0 to n - 1 that are joined pair by pair, and turned: which ones hang together, and whether all that do
-/// can be turned so that each pair agrees.
+/// Items 0 to n - 1 that are joined pair by pair, and turned: which ones hang together, and whether all that
+/// do can be turned so that each pair agrees.
 ///
 /// Cost: 4 bytes an item; a call takes O(log n). Thread safety: that of std::vector.
 class Pieces {
@@ -45,8 +45,8 @@ class Pieces {
 /// Slots that groups connect: how many pieces they make.
 ///
 ///     GroupedSlots cells;
-///     for (FaceId f : faces) { cells.BeginGroup(); for (CellId c : mesh.IncidentCells(f)) cells.Add(c.slot()); }
-///     cells.CountPieces();
+///     for (FaceId f : faces) { cells.BeginGroup(); for (CellId c : mesh.IncidentCells(f))
+///     cells.Add(c.slot()); } cells.CountPieces();
 ///
 /// Cost: n log n for n slots. Thread safety: that of std::vector.
 class GroupedSlots {

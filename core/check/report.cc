@@ -49,14 +49,4 @@ absl::StatusOr<CheckReport> CheckMesh(const Mesh& mesh, const ReportOptions& opt
   return report;
 }
 
-absl::StatusOr<CheckReport> CheckEntities(const Mesh& mesh, EntityKind kind, absl::Span<const Slot> slots,
-                                          const ReportOptions& options, WorkMeter& meter) {
-  CheckReport report;
-  report.revision = mesh.revision();
-  Tallies tallies(mesh, options.checks, options.max_findings);
-  for (Slot slot : slots) DYNMESH_RETURN_IF_ERROR(tallies.Add({kind, slot}, meter));
-  report.tallies = std::move(tallies).Take();
-  return report;
-}
-
 }  // namespace dynmesh

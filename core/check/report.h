@@ -7,7 +7,6 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 #include "absl/types/optional.h"
-#include "absl/types/span.h"
 #include "core/check/check.h"
 #include "core/check/summary.h"
 #include "core/check/tally.h"
@@ -17,15 +16,15 @@
 namespace dynmesh {
 
 struct ReportOptions {
-  CheckSettings checks;          ///< those that are on are made, whatever their severity
-  size_t max_findings = 1000;    ///< of each check and kind; the rest is counted
+  CheckSettings checks;        ///< those that are on are made, whatever their severity
+  size_t max_findings = 1000;  ///< of each check and kind; the rest is counted
 };
 
 /// What checks found in a mesh.
 struct CheckReport {
   int64_t revision = 0;
   std::vector<Tally> tallies;             ///< of the checks that were made, in order
-  absl::optional<MeshTopology> topology;  ///< of the whole mesh
+  absl::optional<MeshTopology> topology;  ///< if the whole mesh was looked at
 };
 
 /// Who is told how far a report is.
@@ -40,10 +39,6 @@ class ReportMonitor {
 /// Cost: about a microsecond an entity with all checks.
 absl::StatusOr<CheckReport> CheckMesh(const Mesh& mesh, const ReportOptions& options, WorkMeter& meter,
                                       ReportMonitor& monitor);
-
-/// Looks at some entities only: local checks, no topology. Errors: those of `meter`. REQUIRES: all are live.
-absl::StatusOr<CheckReport> CheckEntities(const Mesh& mesh, EntityKind kind, absl::Span<const Slot> slots,
-                                          const ReportOptions& options, WorkMeter& meter);
 
 }  // namespace dynmesh
 

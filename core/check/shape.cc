@@ -37,8 +37,8 @@ EdgeLengths LengthsOf(ElementType type, absl::Span<const Point> p) {
 
 double Ratio(double above, double below) { return below > 0 ? above / below : kInfinity; }
 
-/// From 0 to 360: `cross` is the cross product of two directions, and tells by its side whether the angle between
-/// them is less than 180.
+/// From 0 to 360: `cross` is the cross product of two directions, and tells by its side whether the angle
+/// between them is less than 180.
 double AngleOf(const Point& cross, double dot, double side) {
   const double angle = std::atan2(Length(cross), dot + 0.0) * kDegrees;  // -0.0 would be 180 degrees
   return side < 0 ? 360 - angle : angle;

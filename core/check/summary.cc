@@ -60,9 +60,9 @@ absl::StatusOr<MeshTopology> SummarizeTopology(const Mesh& mesh, WorkMeter& mete
   }
   DYNMESH_RETURN_IF_ERROR(CountComponents(mesh, meter, topology));
   DYNMESH_RETURN_IF_ERROR(CountBodies(mesh, meter, topology));
-  DYNMESH_ASSIGN_OR_RETURN(
-      topology.surface,
-      SummarizeSurface(mesh, [&](FaceId f) { return IsSurfaceFace(mesh, f); }, meter));
+  DYNMESH_ASSIGN_OR_RETURN(topology.surface,
+                           SummarizeSurface(
+                               mesh, [&](FaceId f) { return IsSurfaceFace(mesh, f); }, meter));
   const auto is_skin = [&](FaceId f) { return mesh.IncidentCells(f).size() == 1 && !mesh.IsDegenerate(f); };
   DYNMESH_ASSIGN_OR_RETURN(topology.shells, SummarizeSurface(mesh, is_skin, meter));
   return topology;

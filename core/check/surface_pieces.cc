@@ -1,5 +1,5 @@
-// The surface is cut along edges at which other than two faces meet. Then a corner class (corners of faces that
-// are joined round a vertex) is a vertex of the cut surface, and Euler's formula holds for each piece:
+// The surface is cut along edges at which other than two faces meet. Then a corner class (corners of faces
+// that are joined round a vertex) is a vertex of the cut surface, and Euler's formula holds for each piece:
 // vertices - edges + faces = 2 - 2 * genus - loops.
 
 #include "core/check/surface_pieces.h"
@@ -86,7 +86,8 @@ class SurfaceAnalyzer {
     for (FaceId f : faces) {
       if (number_[f.slot()] == kNoSlot) continue;
       const auto edges = mesh_.Edges(f);
-      sides.push_back({number_[f.slot()], static_cast<int>(std::find(edges.begin(), edges.end(), e) - edges.begin())});
+      sides.push_back(
+          {number_[f.slot()], static_cast<int>(std::find(edges.begin(), edges.end(), e) - edges.begin())});
     }
     return absl::OkStatus();
   }
@@ -163,9 +164,9 @@ class SurfaceAnalyzer {
   Pieces faces_;
   Pieces corners_;
   std::vector<RimSide> rim_;
-  std::vector<uint32_t> twisted_;   ///< faces that cannot be turned to agree
-  std::vector<bool> loop_is_open_;  ///< by the side that stands for the loop
-  std::vector<uint32_t> loops_;     ///< the sides that stand for loops
+  std::vector<uint32_t> twisted_;                ///< faces that cannot be turned to agree
+  std::vector<bool> loop_is_open_;               ///< by the side that stands for the loop
+  std::vector<uint32_t> loops_;                  ///< the sides that stand for loops
   absl::flat_hash_map<uint32_t, Piece> pieces_;  ///< by the face that stands for it
 };
 

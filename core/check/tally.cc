@@ -32,7 +32,8 @@ bool Tallies::LookAt(EntityKind kind) const {
 
 absl::Status Tallies::Add(EntityId id, WorkMeter& meter) {
   for (Tally& tally : tallies_) {
-    DYNMESH_ASSIGN_OR_RETURN(const absl::optional<double> value, MeasureEntity(mesh_, tally.check, id, meter));
+    DYNMESH_ASSIGN_OR_RETURN(const absl::optional<double> value,
+                             MeasureEntity(mesh_, tally.check, id, meter));
     if (!value.has_value() || !tally.Note(*value)) continue;
     Findings& findings = tally.findings[Dimension(id.kind)];
     ++findings.count;

@@ -27,9 +27,9 @@ struct Tally {
   CheckSetting setting;
   uint64_t num_measured = 0;  ///< entities; of the whole mesh: 1
   uint64_t num_bad = 0;
-  double lowest = std::numeric_limits<double>::infinity();    ///< value, of what was measured
+  double lowest = std::numeric_limits<double>::infinity();  ///< value, of what was measured
   double highest = -std::numeric_limits<double>::infinity();
-  std::array<Findings, kNumEntityKinds> findings;             ///< of local checks, by kind
+  std::array<Findings, kNumEntityKinds> findings;  ///< of local checks, by kind
 
   /// Notes a value; true when it is bad.
   bool Note(double value);

@@ -30,8 +30,8 @@ class BatchChecker {
  public:
   virtual ~BatchChecker() = default;
 
-  /// Looks at what the open batch of `mesh` has touched, and appends what deserves a look. An error refuses the
-  /// batch. REQUIRES: a batch is open.
+  /// Looks at what the open batch of `mesh` has touched, and appends what deserves a look. An error refuses
+  /// the batch. REQUIRES: a batch is open.
   virtual absl::Status Check(const Mesh& mesh, WorkMeter& meter, std::vector<BatchWarning>& warnings) = 0;
 };
 

@@ -8,8 +8,8 @@
 
 namespace dynmesh {
 
-/// A vertex and the other ends of three of its edges, which turn as the first corner of a tetrahedron does. Of
-/// a pyramid and a prism the third end is the apex, or lies on the other triangle.
+/// A vertex and the other ends of three of its edges, which turn as the first corner of a tetrahedron does.
+/// Of a pyramid and a prism the third end is the apex, or lies on the other triangle.
 struct Corner {
   uint8_t at;
   uint8_t ends[3];

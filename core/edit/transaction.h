@@ -46,9 +46,9 @@ struct BatchResult {
   std::vector<EditResult> results;
   Checksum checksum;
   std::array<uint32_t, kNumEntityKinds> counts = {};
-  uint64_t num_made = 0;             ///< elements, by operators
-  std::vector<EntityId> degenerate;  ///< elements added that name a vertex twice
-  std::vector<EntityId> duplicate;   ///< elements added that equal one that was there
+  uint64_t num_made = 0;               ///< elements, by operators
+  std::vector<EntityId> degenerate;    ///< elements added that name a vertex twice
+  std::vector<EntityId> duplicate;     ///< elements added that equal one that was there
   std::vector<BatchWarning> warnings;  ///< of BatchOptions::checker
 };
 
@@ -80,8 +80,8 @@ struct BatchOptions {
 /// freed in a batch is reused in it and as_of_revision lies before it. A face or edge that was an element,
 /// then derived, and is an element again counts as another one.
 ///
-/// Errors: those of Mesh's edits, with metadata "edit" (index in `edits`) and "index" (item of that edit); those
-/// of the checker.
+/// Errors: those of Mesh's edits, with metadata "edit" (index in `edits`) and "index" (item of that edit);
+/// those of the checker.
 /// After an error or a dry run the mesh is as it was, to the last id and stamp.
 /// REQUIRES: no batch is open on `mesh`. Cost: linear in the entities touched.
 absl::StatusOr<BatchResult> ApplyBatch(Mesh& mesh, absl::Span<const Edit> edits, const BatchOptions& options);

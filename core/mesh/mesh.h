@@ -278,8 +278,8 @@ class Mesh {
   using Savepoint = size_t;
   Savepoint MakeSavepoint() const { return journal_.entries.size(); }
   void RollbackTo(Savepoint savepoint);
-  /// Live entities whose shape, incidences or elements the open batch may have changed, ascending: what it made or
-  /// removed an element of, what that is made of, and the stars of moved vertices. Errors: those of `meter`.
+  /// Live entities whose shape, incidences or elements the open batch may have changed, ascending: what it
+  /// made or removed, what that is made of, and the stars of moved vertices. Errors: those of `meter`.
   /// REQUIRES: a batch is open. Cost: linear in the journal and in these stars, and sorting them.
   absl::StatusOr<EntitySlots> Touched(WorkMeter& meter) const;
 

@@ -1,5 +1,3 @@
-#include "core/check/report.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -8,6 +6,7 @@
 #include <vector>
 
 #include "core/check/local_check.h"
+#include "core/check/report.h"
 #include "tests/support/count_down.h"
 #include "tests/support/meshes.h"
 #include "tests/support/random_edits.h"
@@ -103,7 +102,8 @@ TEST(ReportTest, EveryValueOfRandomMeshesIsThatOfItsEntity) {
           if (value && Fails(tally.check, *value, tally.setting.threshold)) bad[{kind, slot}] = *value;
         });
         const Findings& findings = tally.findings[Dimension(kind)];
-        for (size_t i = 0; i < findings.slots.size(); ++i) told[{kind, findings.slots[i]}] = findings.values[i];
+        for (size_t i = 0; i < findings.slots.size(); ++i)
+          told[{kind, findings.slots[i]}] = findings.values[i];
       }
       EXPECT_EQ(told, bad) << TraitsOf(tally.check).name;
       EXPECT_EQ(tally.num_bad, bad.size());
@@ -125,15 +125,6 @@ TEST(ReportTest, EndsWhereItsMeterSaysSo) {
     EXPECT_EQ(CheckMesh(mesh, AllOn(), meter, phases).status(), CountDown::error());
     EXPECT_EQ(meter.charges_after_end(), 0);
   }
-}
-
-TEST(ReportTest, SomeEntitiesCanBeLookedAtAlone) {
-  const Mesh mesh = BowTie();
-  const auto report = CheckEntities(mesh, EntityKind::kVertex, {1, 0}, AllOn(), WorkMeter::Unlimited());
-  ASSERT_TRUE(report.ok());
-  EXPECT_FALSE(report->topology.has_value());
-  EXPECT_EQ(TallyOf(*report, CheckKind::kVertexLink).num_measured, 2u);
-  EXPECT_THAT(TallyOf(*report, CheckKind::kVertexLink).findings[0].slots, ElementsAre(0));
 }
 
 }  // namespace

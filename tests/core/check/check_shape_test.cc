@@ -1,5 +1,3 @@
-#include "core/check/shape.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -7,6 +5,7 @@
 #include <random>
 #include <vector>
 
+#include "core/check/shape.h"
 #include "core/edit/geometry.h"
 
 namespace dynmesh {
@@ -48,8 +47,7 @@ TEST(ShapeTest, AnglesOfFacesAreThoseOfTheTextbook) {
 
 TEST(ShapeTest, AnArrowheadHasAnAngleOfMoreThan180) {
   const double wing = Degrees(std::atan2(1, 4)), tip = 2 * Degrees(std::atan2(1, 4));
-  const AngleRange angles =
-      FaceAngles(ElementType::kQuad, {{0, 0, 0}, {-1, -1, 0}, {3, 0, 0}, {-1, 1, 0}});
+  const AngleRange angles = FaceAngles(ElementType::kQuad, {{0, 0, 0}, {-1, -1, 0}, {3, 0, 0}, {-1, 1, 0}});
   EXPECT_NEAR(angles.largest, 270, 1e-9);
   EXPECT_NEAR(angles.smallest, std::min(tip, Degrees(std::atan2(1, 1)) - wing), 1e-9);
 }
@@ -57,8 +55,8 @@ TEST(ShapeTest, AnArrowheadHasAnAngleOfMoreThan180) {
 TEST(ShapeTest, DihedralAnglesAreThoseOfTheTextbook) {
   const double regular = Degrees(std::acos(1.0 / 3));  // 70.53
   ExpectAngles(DihedralAngles(kTetrahedron.type, kTetrahedron.points), regular, regular);
-  ExpectAngles(DihedralAngles(kCornerOfCube.type, kCornerOfCube.points), Degrees(std::acos(std::sqrt(1.0 / 3))),
-               90);
+  ExpectAngles(DihedralAngles(kCornerOfCube.type, kCornerOfCube.points),
+               Degrees(std::acos(std::sqrt(1.0 / 3))), 90);
   ExpectAngles(DihedralAngles(kCube.type, kCube.points), 90, 90);
   ExpectAngles(DihedralAngles(kPrism.type, kPrism.points), 60, 90);
   ExpectAngles(DihedralAngles(kPyramid.type, kPyramid.points), Degrees(std::acos(std::sqrt(1.0 / 3))),
@@ -120,7 +118,8 @@ TEST(ShapeTest, TheConditionOfATriangleIsTheInverseOfItsMeanRatio) {
   for (int round = 0; round < 100; ++round) {
     std::vector<Point> points(3);
     for (Point& p : points) p = {coordinate(rng), coordinate(rng), coordinate(rng)};
-    EXPECT_NEAR(ConditionNumber(ElementType::kTriangle, points) * Quality(ElementType::kTriangle, points), 1, 1e-9);
+    EXPECT_NEAR(ConditionNumber(ElementType::kTriangle, points) * Quality(ElementType::kTriangle, points), 1,
+                1e-9);
   }
 }
 

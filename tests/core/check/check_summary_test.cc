@@ -1,5 +1,3 @@
-#include "core/check/summary.h"
-
 #include <gtest/gtest.h>
 
 #include <set>
@@ -7,6 +5,7 @@
 
 #include "core/check/incidence.h"
 #include "core/check/pieces.h"
+#include "core/check/summary.h"
 #include "tests/support/count_down.h"
 #include "tests/support/meshes.h"
 #include "tests/support/random_edits.h"
@@ -87,8 +86,7 @@ TEST(SummaryTest, ATorusWithAHoleHasAHoleAndItsHandle) {
   mesh.BeginBatch();
   ASSERT_TRUE(mesh.RemoveElement(FaceId(5)).ok());
   Commit(mesh);
-  ExpectSurface(TopologyOf(mesh).surface,
-                {.pieces = 1, .holes = 1, .genus = 1, .euler_characteristic = -1});
+  ExpectSurface(TopologyOf(mesh).surface, {.pieces = 1, .holes = 1, .genus = 1, .euler_characteristic = -1});
 }
 
 TEST(SummaryTest, FacesThatTurnDifferentlyCanBeOrientedAllTheSame) {
@@ -106,8 +104,14 @@ TEST(SummaryTest, ABookIsCutAlongItsSpineWhichIsNoHole) {
                 {.pieces = 3, .non_manifold = 3, .holes = 3, .euler_characteristic = 3});
   Mesh closed;  // two tetrahedral surfaces that share an edge
   AddVertices(closed, 6);
-  for (auto v : {std::vector<Slot>{0, 1, 2}, {0, 3, 1}, {1, 3, 2}, {0, 2, 3},
-                 {0, 1, 4}, {0, 5, 1}, {1, 5, 4}, {0, 4, 5}}) {
+  for (auto v : {std::vector<Slot>{0, 1, 2},
+                 {0, 3, 1},
+                 {1, 3, 2},
+                 {0, 2, 3},
+                 {0, 1, 4},
+                 {0, 5, 1},
+                 {1, 5, 4},
+                 {0, 4, 5}}) {
     Add(closed, ElementType::kTriangle, {v[0], v[1], v[2]});
   }
   Commit(closed);

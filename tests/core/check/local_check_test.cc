@@ -17,15 +17,15 @@ namespace dynmesh {
 namespace {
 
 using ::dynmesh::testing::Add;
-using ::dynmesh::testing::ElementModel;
-using ::dynmesh::testing::RandomEditor;
-using ::dynmesh::testing::BowTie;
 using ::dynmesh::testing::Book;
+using ::dynmesh::testing::BowTie;
 using ::dynmesh::testing::Commit;
 using ::dynmesh::testing::CountDown;
+using ::dynmesh::testing::ElementModel;
 using ::dynmesh::testing::MoebiusStrip;
 using ::dynmesh::testing::Octahedron;
 using ::dynmesh::testing::OneTet;
+using ::dynmesh::testing::RandomEditor;
 using ::dynmesh::testing::TetWheel;
 using ::dynmesh::testing::TwoHexes;
 

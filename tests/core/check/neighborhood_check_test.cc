@@ -20,8 +20,8 @@
 namespace dynmesh {
 namespace {
 
-using ::dynmesh::testing::BowTie;
 using ::dynmesh::testing::Book;
+using ::dynmesh::testing::BowTie;
 using ::dynmesh::testing::Commit;
 using ::dynmesh::testing::CountDown;
 using ::dynmesh::testing::Describe;
@@ -208,7 +208,8 @@ TEST(TouchedTest, EveryEntityOfWhichACheckSaysSomethingElseIsTouched) {
         // Of two equal cells the newer one is touched, and tells.
         if (key.first == CheckKind::kDuplicate && key.second.kind == EntityKind::kCell) continue;
         EXPECT_TRUE(IsTouched(*touched, key.second))
-            << TraitsOf(key.first).name << " of " << EntityKindName(key.second.kind) << " " << key.second.slot;
+            << TraitsOf(key.first).name << " of " << EntityKindName(key.second.kind) << " "
+            << key.second.slot;
       }
       Commit(mesh);
     }
