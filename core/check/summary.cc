@@ -20,7 +20,6 @@ absl::Status ForEachLive(const Mesh& mesh, EntityKind kind, WorkMeter& meter,
 
 absl::Status CountComponents(const Mesh& mesh, WorkMeter& meter, MeshTopology& topology) {
   const Slots& vertices = mesh.slots(EntityKind::kVertex);
-  DYNMESH_RETURN_IF_ERROR(meter.ChargeBytes(vertices.limit() * sizeof(Slot)));
   Pieces pieces(vertices.limit());
   DYNMESH_RETURN_IF_ERROR(ForEachLive(mesh, EntityKind::kEdge, meter, [&](Slot e) {
     const auto ends = mesh.Vertices(EdgeId(e));
@@ -35,7 +34,6 @@ absl::Status CountComponents(const Mesh& mesh, WorkMeter& meter, MeshTopology& t
 
 absl::Status CountBodies(const Mesh& mesh, WorkMeter& meter, MeshTopology& topology) {
   const Slot limit = mesh.slots(EntityKind::kCell).limit();
-  DYNMESH_RETURN_IF_ERROR(meter.ChargeBytes(limit * sizeof(Slot)));
   Pieces cells(limit);
   std::vector<uint32_t> twisted;
   DYNMESH_RETURN_IF_ERROR(ForEachLive(mesh, EntityKind::kFace, meter, [&](Slot f) {

@@ -14,9 +14,6 @@
 namespace dynmesh {
 namespace {
 
-/// The member, its piece, its corners.
-constexpr uint64_t kMemberBytes = (2 + kMaxFaceVertices) * sizeof(uint32_t);
-
 class SurfaceAnalyzer {
  public:
   SurfaceAnalyzer(const Mesh& mesh, WorkMeter& meter, const std::vector<FaceId>& members)
@@ -181,7 +178,6 @@ absl::StatusOr<SurfaceSummary> SummarizeSurface(const Mesh& mesh, absl::Function
     if (is_member(FaceId(slot))) members.push_back(FaceId(slot));
   }
   if (members.empty()) return SurfaceSummary();
-  DYNMESH_RETURN_IF_ERROR(meter.ChargeBytes(faces.size() * sizeof(Slot) + members.size() * kMemberBytes));
   return SurfaceAnalyzer(mesh, meter, members).Run();
 }
 

@@ -137,7 +137,7 @@ TEST_F(ChecksRpcTest, OnlyTheChecksAskedForAreMadeWithTheirThresholds) {
 }
 
 TEST_F(ChecksRpcTest, ManyFindingsComeInPiecesThatFitAMessage) {
-  const Mesh grid = HexGrid(48, 48, 48);
+  const Mesh grid = HexGrid(32, 32, 32);
   ASSERT_TRUE(Import("mesh", grid, nullptr, 20'000).ok());
   v1::CheckSessionRequest request;
   *request.add_checks() = Setting(v1::CHECK_KIND_QUALITY);
@@ -177,7 +177,7 @@ TEST_F(ChecksRpcTest, WhatIsAskedWrongIsRefused) {
   refused(Setting(v1::CHECK_KIND_UNSPECIFIED));
   refused(Setting(static_cast<v1::CheckKind>(99)));
   refused(Setting(v1::CHECK_KIND_QUALITY, static_cast<v1::CheckSeverity>(99)));
-  for (double threshold : {-1.0, 2.0, std::nan(""), INFINITY}) {
+  for (double threshold : {-1.0, 2.0, std::nan(""), double{INFINITY}}) {
     v1::CheckSetting setting = Setting(v1::CHECK_KIND_QUALITY);
     setting.set_threshold(threshold);
     refused(setting);
@@ -235,10 +235,13 @@ TEST_F(ChecksRpcTest, WarningsRideOnTheReply) {
 }
 
 TEST_F(ChecksRpcTest, AReportThatNobodyWantsEnds) {
-  ASSERT_TRUE(Import("mesh", HexGrid(40, 40, 40), nullptr, 20'000).ok());
+  ASSERT_TRUE(Import("mesh", HexGrid(32, 32, 32), nullptr, 20'000).ok());
   PatientContext context;
   v1::CheckSessionRequest request;
   request.set_session("mesh");
+  *request.add_checks() = Setting(v1::CHECK_KIND_FACE_CELLS);
+  request.mutable_checks(0)->set_threshold(0);
+  request.set_max_findings(kMaxFindings);  // more than is sent before it is read
   const auto stream = checks().CheckSession(&context, request);
   v1::CheckSessionResponse response;
   ASSERT_TRUE(stream->Read(&response));
@@ -251,7 +254,7 @@ TEST_F(ChecksRpcTest, AReportThatNobodyWantsEnds) {
 }
 
 TEST_F(ChecksRpcTest, OthersEditWhileAReportIsMade) {
-  ASSERT_TRUE(Import("mesh", HexGrid(30, 30, 30), nullptr, 20'000).ok());
+  ASSERT_TRUE(Import("mesh", HexGrid(24, 24, 24), nullptr, 20'000).ok());
   PatientContext context;
   v1::CheckSessionRequest request;
   request.set_session("mesh");
