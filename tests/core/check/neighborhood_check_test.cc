@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -20,8 +21,8 @@
 namespace dynmesh {
 namespace {
 
+using ::dynmesh::testing::AllMeshes;
 using ::dynmesh::testing::Book;
-using ::dynmesh::testing::BowTie;
 using ::dynmesh::testing::Commit;
 using ::dynmesh::testing::CountDown;
 using ::dynmesh::testing::Describe;
@@ -32,7 +33,6 @@ using ::dynmesh::testing::ModelOf;
 using ::dynmesh::testing::RandomEditor;
 using ::dynmesh::testing::TetGrid;
 using ::dynmesh::testing::TetWheel;
-using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
 CheckSettings With(CheckKind check, Severity severity) {
@@ -188,6 +188,21 @@ bool IsTouched(const EntitySlots& touched, EntityId id) {
   return std::binary_search(slots.begin(), slots.end(), id.slot);
 }
 
+/// Fails the test unless all entities of which a check says something else than before are touched.
+void ExpectChangesAreTouched(const Mesh& mesh, const Values& before) {
+  const auto touched = mesh.Touched(WorkMeter::Unlimited());
+  ASSERT_TRUE(touched.ok());
+  for (const auto& [key, value] : AllValues(mesh)) {
+    const auto& [check, id] = key;
+    const auto it = before.find(key);
+    if (it != before.end() && IsSame(it->second, value)) continue;
+    // Of two equal cells the newer one is touched, and tells.
+    if (check == CheckKind::kDuplicate && id.kind == EntityKind::kCell) continue;
+    EXPECT_TRUE(IsTouched(*touched, id))
+        << TraitsOf(check).name << " of " << EntityKindName(id.kind) << " " << id.slot;
+  }
+}
+
 TEST(TouchedTest, EveryEntityOfWhichACheckSaysSomethingElseIsTouched) {
   for (uint32_t seed = 1; seed <= 30; ++seed) {
     SCOPED_TRACE(::testing::Message() << "seed " << seed);
@@ -200,18 +215,39 @@ TEST(TouchedTest, EveryEntityOfWhichACheckSaysSomethingElseIsTouched) {
       const Values before = AllValues(mesh);
       mesh.BeginBatch();
       for (int edit = 0; edit < 1 + batch % 4; ++edit) editor.Edit();
-      const auto touched = mesh.Touched(WorkMeter::Unlimited());
-      ASSERT_TRUE(touched.ok());
-      for (const auto& [key, value] : AllValues(mesh)) {
-        const auto it = before.find(key);
-        if (it != before.end() && IsSame(it->second, value)) continue;
-        // Of two equal cells the newer one is touched, and tells.
-        if (key.first == CheckKind::kDuplicate && key.second.kind == EntityKind::kCell) continue;
-        EXPECT_TRUE(IsTouched(*touched, key.second))
-            << TraitsOf(key.first).name << " of " << EntityKindName(key.second.kind) << " "
-            << key.second.slot;
-      }
+      ExpectChangesAreTouched(mesh, before);
       Commit(mesh);
+    }
+  }
+}
+
+/// Looks whether what operators change is touched.
+class TouchChecker : public BatchChecker {
+ public:
+  explicit TouchChecker(const Mesh& mesh) : before_(AllValues(mesh)) {}
+  absl::Status Check(const Mesh& mesh, WorkMeter&, std::vector<BatchWarning>&) override {
+    ExpectChangesAreTouched(mesh, before_);
+    return absl::OkStatus();
+  }
+
+ private:
+  const Values before_;
+};
+
+TEST(TouchedTest, SoIsEveryEntityThatOperatorsChange) {
+  std::mt19937 rng(3);
+  for (auto& [name, mesh] : AllMeshes()) {
+    SCOPED_TRACE(name);
+    for (int round = 0; round < 12; ++round) {
+      std::vector<Slot> edges;
+      mesh.slots(EntityKind::kEdge).live().ForEach([&](Slot e) { edges.push_back(e); });
+      std::shuffle(edges.begin(), edges.end(), rng);
+      const EdgeNames some{{edges[0], edges[1]}, {}};
+      const std::vector<Edit> operators = {SplitEdgesEdit{some, {}, {}, {}},
+                                           CollapseEdgesEdit{some, {}, {}, {}}, SwapEdgesEdit{some, {}}};
+      TouchChecker checker(mesh);
+      const BatchOptions options{.skip_refused = true, .checker = &checker};
+      EXPECT_TRUE(ApplyBatch(mesh, {operators[round % 3]}, options).ok());
     }
   }
 }
