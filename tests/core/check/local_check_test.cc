@@ -176,6 +176,25 @@ TEST(LocalCheckTest, WhatCostsTooMuchIsNotGoneOnWith) {
   EXPECT_FALSE(MeasureEntity(mesh, CheckKind::kVertexLink, VertexId(0), meter).ok());
 }
 
+TEST(LocalCheckTest, CoordinatesAtTheEndsOfTheirRangeAreMeasuredOrBadButDoNoHarm) {
+  for (double size : {1e308, 1e155, 1e-160, 5e-324}) {
+    Mesh mesh = MakeMesh(4);
+    Add(mesh, ElementType::kTetrahedron, {0, 1, 2, 3});
+    for (Slot v = 0; v < 4; ++v) {
+      Point p = {-size, -size, -size};
+      if (v > 0) p[v - 1] = size;
+      ASSERT_TRUE(mesh.MoveVertex(VertexId(v), p).ok());
+    }
+    Commit(mesh);
+    for (CheckKind check : AllChecks()) {
+      if (!IsLocal(check) || !LooksAt(check, EntityKind::kCell)) continue;
+      const double value = *ValueAt(mesh, check, CellId(0));
+      const bool is_bad = Fails(check, value, TraitsOf(check).default_threshold);
+      EXPECT_TRUE(is_bad || std::isfinite(value)) << TraitsOf(check).name << " at " << size << ": " << value;
+    }
+  }
+}
+
 // ---- Against brute force, which knows the vertices of elements only ----
 
 using Cycle = std::vector<VertexId>;
