@@ -6,39 +6,11 @@
 #include <limits>
 
 #include "absl/types/optional.h"
+#include "core/edit/corners.h"
 #include "core/mesh/vector.h"
 
 namespace dynmesh {
 namespace {
-
-/// A vertex and the other ends of three of its edges, which turn as the first corner of a tetrahedron does.
-struct Corner {
-  uint8_t at;
-  uint8_t ends[3];
-};
-
-constexpr Corner kTetrahedronCorners[] = {{0, {1, 2, 3}}, {1, {2, 0, 3}}, {2, {0, 1, 3}}, {3, {0, 2, 1}}};
-/// The apex has four edges, and no corner.
-constexpr Corner kPyramidCorners[] = {{0, {1, 3, 4}}, {1, {2, 0, 4}}, {2, {3, 1, 4}}, {3, {0, 2, 4}}};
-constexpr Corner kPrismCorners[] = {{0, {2, 1, 3}}, {1, {0, 2, 4}}, {2, {1, 0, 5}},
-                                    {3, {4, 5, 0}}, {4, {5, 3, 1}}, {5, {3, 4, 2}}};
-constexpr Corner kHexahedronCorners[] = {{0, {1, 3, 4}}, {1, {2, 0, 5}}, {2, {3, 1, 6}}, {3, {0, 2, 7}},
-                                         {4, {7, 5, 0}}, {5, {4, 6, 1}}, {6, {5, 7, 2}}, {7, {6, 4, 3}}};
-
-absl::Span<const Corner> CornersOf(ElementType type) {
-  switch (type) {
-    case ElementType::kTetrahedron:
-      return kTetrahedronCorners;
-    case ElementType::kPyramid:
-      return kPyramidCorners;
-    case ElementType::kPrism:
-      return kPrismCorners;
-    case ElementType::kHexahedron:
-      return kHexahedronCorners;
-    default:
-      return {};
-  }
-}
 
 /// The scaled Jacobian at a corner of the regular shape.
 double RegularCorner(ElementType type) {
@@ -179,6 +151,12 @@ bool IsFlatFace(ElementType type, absl::Span<const Point> p) {
   const int n = NumVertices(type);
   for (int k = 0; k < n; ++k) longest = std::max(longest, Length(p[(k + 1) % n] - p[k]));
   return !(Length(AreaVector(type, p)) > kFlat * longest * longest);
+}
+
+double SmallestScaledJacobian(ElementType type, absl::Span<const Point> p) {
+  double low = 1;
+  for (const Corner& corner : CornersOf(type)) low = std::min(low, ScaledJacobian(corner, p));
+  return low;
 }
 
 double Quality(ElementType type, absl::Span<const Point> p) {

@@ -24,6 +24,10 @@ inline constexpr double kFlat = 1e-9;
 /// edges.
 int Orientation(ElementType type, absl::Span<const Point> points);
 
+/// Of the corners of a cell, by the orientation of its template: from 1 (three right angles) to -1; less than
+/// 0 where a corner lies the other way. REQUIRES: type is a cell's.
+double SmallestScaledJacobian(ElementType type, absl::Span<const Point> points);
+
 /// Whether a triangle or quad has no side that it faces. REQUIRES: type is one of these.
 bool IsFlatFace(ElementType type, absl::Span<const Point> points);
 

@@ -186,12 +186,37 @@ absl::Status ApplyAll(Mesh& mesh, absl::Span<const Edit> edits, const BatchOptio
   return absl::OkStatus();
 }
 
+/// Counts what a checker looks at.
+class CheckMeter final : public WorkMeter {
+ public:
+  explicit CheckMeter(uint64_t max_work) : max_work_(max_work) {}
+
+  absl::Status ChargeSteps(uint64_t steps) override {
+    work_ += steps;
+    return work_ <= max_work_ ? absl::OkStatus() : LimitExceeded("max_batch_work", max_work_, work_);
+  }
+  absl::Status ChargeBytes(uint64_t) override { return absl::OkStatus(); }
+
+ private:
+  const uint64_t max_work_;
+  uint64_t work_ = 0;
+};
+
+absl::Status CheckAll(const Mesh& mesh, const BatchOptions& options, BatchResult& result) {
+  if (options.checker == nullptr) return absl::OkStatus();
+  CheckMeter meter(options.max_work);
+  return options.checker->Check(mesh, meter, result.warnings);
+}
+
 }  // namespace
 
 absl::StatusOr<BatchResult> ApplyBatch(Mesh& mesh, absl::Span<const Edit> edits,
                                        const BatchOptions& options) {
   BatchResult result;
-  const absl::Status applied = RunInBatch(mesh, [&] { return ApplyAll(mesh, edits, options, result); });
+  const absl::Status applied = RunInBatch(mesh, [&] {
+    const absl::Status applied = ApplyAll(mesh, edits, options, result);
+    return applied.ok() ? CheckAll(mesh, options, result) : applied;
+  });
   if (!applied.ok()) return applied;
   result.checksum = mesh.checksum();
   for (EntityKind kind : kEntityKinds) result.counts[Dimension(kind)] = mesh.NumLive(kind);

@@ -9,6 +9,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/types/span.h"
+#include "core/edit/batch_checker.h"
 #include "core/edit/edits.h"
 #include "core/mesh/mesh.h"
 
@@ -45,9 +46,10 @@ struct BatchResult {
   std::vector<EditResult> results;
   Checksum checksum;
   std::array<uint32_t, kNumEntityKinds> counts = {};
-  uint64_t num_made = 0;             ///< elements, by operators
-  std::vector<EntityId> degenerate;  ///< elements added that name a vertex twice
-  std::vector<EntityId> duplicate;   ///< elements added that equal one that was there
+  uint64_t num_made = 0;               ///< elements, by operators
+  std::vector<EntityId> degenerate;    ///< elements added that name a vertex twice
+  std::vector<EntityId> duplicate;     ///< elements added that equal one that was there
+  std::vector<BatchWarning> warnings;  ///< of BatchOptions::checker
 };
 
 struct BatchOptions {
@@ -66,6 +68,9 @@ struct BatchOptions {
   uint64_t max_work = std::numeric_limits<uint64_t>::max();
   /// The same for bytes of attributes that new vertices and elements take.
   uint64_t max_attribute_bytes = std::numeric_limits<uint64_t>::max();
+  /// Looks at the mesh after the last edit, and may refuse the batch or add warnings. It may look at max_work
+  /// entities, too. Null: nobody looks.
+  BatchChecker* checker = nullptr;
 };
 
 /// Applies `edits` in order to `mesh`, all or nothing, as one revision.
@@ -75,7 +80,8 @@ struct BatchOptions {
 /// freed in a batch is reused in it and as_of_revision lies before it. A face or edge that was an element,
 /// then derived, and is an element again counts as another one.
 ///
-/// Errors: those of Mesh's edits, with metadata "edit" (index in `edits`) and "index" (item of that edit).
+/// Errors: those of Mesh's edits, with metadata "edit" (index in `edits`) and "index" (item of that edit);
+/// those of the checker.
 /// After an error or a dry run the mesh is as it was, to the last id and stamp.
 /// REQUIRES: no batch is open on `mesh`. Cost: linear in the entities touched.
 absl::StatusOr<BatchResult> ApplyBatch(Mesh& mesh, absl::Span<const Edit> edits, const BatchOptions& options);

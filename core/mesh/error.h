@@ -51,6 +51,7 @@ inline constexpr char kShuttingDown[] = "SHUTTING_DOWN";
 inline constexpr char kCorruptPayload[] = "CORRUPT_PAYLOAD";
 inline constexpr char kUnsupportedFormat[] = "UNSUPPORTED_FORMAT";
 inline constexpr char kChecksumMismatch[] = "CHECKSUM_MISMATCH";
+inline constexpr char kCheckFailed[] = "CHECK_FAILED";  // metadata: check, kind, ids, value, threshold, count
 inline constexpr char kInternal[] = "INTERNAL";
 
 // Why an edit operator refuses; the table of operators in core/edit says which gives which.

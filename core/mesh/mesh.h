@@ -28,6 +28,7 @@
 #include "core/mesh/stamps.h"
 #include "core/mesh/stored_relations.h"
 #include "core/mesh/vertex_cycle.h"
+#include "core/mesh/work_meter.h"
 
 namespace dynmesh {
 
@@ -58,6 +59,9 @@ struct NewElement {
 };
 
 enum class DuplicatePolicy { kKeep, kRefuse };
+
+/// Slots of each kind.
+using EntitySlots = std::array<std::vector<Slot>, kNumEntityKinds>;
 
 /// Upper bounds on slots ever used, for each kind; beyond: RESOURCE_EXHAUSTED. An element is let in only if
 /// there is room for all its faces and edges, as if none of them existed.
@@ -285,6 +289,10 @@ class Mesh {
   using Savepoint = size_t;
   Savepoint MakeSavepoint() const { return journal_.entries.size(); }
   void RollbackTo(Savepoint savepoint);
+  /// Live entities whose shape, incidences or elements the open batch may have changed, ascending: what it
+  /// made or removed, what that is made of, and the stars of moved vertices. Errors: those of `meter`.
+  /// REQUIRES: a batch is open. Cost: linear in the journal and in these stars, and sorting them.
+  absl::StatusOr<EntitySlots> Touched(WorkMeter& meter) const;
 
   // ---- Upkeep ----
 

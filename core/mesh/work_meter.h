@@ -1,6 +1,7 @@
 #ifndef DYNMESH_CORE_MESH_WORK_METER_H_
 #define DYNMESH_CORE_MESH_WORK_METER_H_
 
+#include <algorithm>
 #include <cstdint>
 
 #include "absl/status/status.h"
@@ -18,6 +19,14 @@ class WorkMeter {
 
   /// To be called before `steps` entities, or entries of incidence lists, are looked at.
   virtual absl::Status ChargeSteps(uint64_t steps) = 0;
+  /// The same for any number of steps.
+  absl::Status ChargeManySteps(uint64_t steps) {
+    absl::Status status;
+    for (; steps > 0 && status.ok(); steps -= std::min(steps, kMaxCharge)) {
+      status = ChargeSteps(std::min(steps, kMaxCharge));
+    }
+    return status;
+  }
   /// To be called before a result grows by `bytes`.
   virtual absl::Status ChargeBytes(uint64_t bytes) = 0;
 

@@ -10,6 +10,25 @@ namespace dynmesh {
 
 static_assert(std::endian::native == std::endian::little, "arrays travel as they lie in memory");
 
+namespace {
+
+v1::Warning FromFailedCheck(const MeshWarning& warning) {
+  const CheckTraits& traits = TraitsOf(warning.check);
+  const absl::string_view side = traits.bad == BadSide::kBelow ? "below " : "above ";
+  v1::Warning message;
+  message.set_reason(reason::kCheckFailed);
+  message.set_message(absl::StrCat(traits.name, " is ", side, warning.threshold));
+  message.set_kind(FromEntityKind(warning.kind));
+  message.set_ids(FromArray(warning.ids));
+  message.set_count(warning.count);
+  message.set_check(static_cast<v1::CheckKind>(warning.check));
+  message.set_threshold(warning.threshold);
+  message.set_values(FromArray(warning.values));
+  return message;
+}
+
+}  // namespace
+
 absl::Status BadArrayLength(absl::string_view field, size_t bytes, size_t record_bytes) {
   return InvalidArgument(
       reason::kBadArrayLength,
@@ -80,6 +99,7 @@ v1::EntityCounts FromCounts(const KindCounts& counts) {
 }
 
 v1::Warning FromWarning(const MeshWarning& warning) {
+  if (warning.warning == WarningKind::kCheckFailed) return FromFailedCheck(warning);
   const bool degenerate = warning.warning == WarningKind::kDegenerateElement;
   v1::Warning message;
   message.set_reason(degenerate ? "DEGENERATE_ELEMENT" : reason::kDuplicateElement);

@@ -8,6 +8,7 @@
 #include "absl/strings/str_cat.h"
 #include "core/mesh/error.h"
 #include "server/rpc/convert.h"
+#include "server/rpc/convert_checks.h"
 #include "server/session/session_errors.h"
 
 namespace dynmesh {
@@ -65,20 +66,7 @@ struct ExportVisitor {
   }
 };
 
-}  // namespace
-
-absl::StatusOr<SessionSettings> ToSettings(const v1::SessionSettings& message) {
-  SessionSettings settings;
-  if (message.duplicate_policy() == v1::DUPLICATE_POLICY_REFUSE) {
-    settings.duplicates = DuplicatePolicy::kRefuse;
-  } else if (message.duplicate_policy() != v1::DUPLICATE_POLICY_UNSPECIFIED &&
-             message.duplicate_policy() != v1::DUPLICATE_POLICY_KEEP) {
-    return BadField("duplicate_policy", "there is no such duplicate_policy");
-  }
-  DYNMESH_ASSIGN_OR_RETURN(settings.stored_relations, ToStoredRelations(message));
-  return settings;
-}
-
+/// Each storable, and named once.
 absl::StatusOr<std::vector<Relation>> ToStoredRelations(const v1::SessionSettings& message) {
   std::vector<Relation> relations;
   for (const v1::Relation& named : message.stored_relations()) {
@@ -97,14 +85,36 @@ absl::StatusOr<std::vector<Relation>> ToStoredRelations(const v1::SessionSetting
   return relations;
 }
 
-absl::Status CheckUpdateMask(const google::protobuf::FieldMask& mask) {
-  if (mask.paths().empty()) return BadField("update_mask", "update_mask names no field");
-  for (const std::string& path : mask.paths()) {
-    if (path == "settings.stored_relations") continue;
-    return BadField("update_mask", absl::StrCat("\"", absl::CHexEscape(path.substr(0, kMaxShownPath)),
-                                                "\" is not a field that can be changed"));
+}  // namespace
+
+absl::StatusOr<SessionSettings> ToSettings(const v1::SessionSettings& message) {
+  SessionSettings settings;
+  if (message.duplicate_policy() == v1::DUPLICATE_POLICY_REFUSE) {
+    settings.duplicates = DuplicatePolicy::kRefuse;
+  } else if (message.duplicate_policy() != v1::DUPLICATE_POLICY_UNSPECIFIED &&
+             message.duplicate_policy() != v1::DUPLICATE_POLICY_KEEP) {
+    return BadField("duplicate_policy", "there is no such duplicate_policy");
   }
-  return absl::OkStatus();
+  DYNMESH_ASSIGN_OR_RETURN(settings.stored_relations, ToStoredRelations(message));
+  DYNMESH_ASSIGN_OR_RETURN(settings.checks, ToLocalCheckSettings(message.checks()));
+  return settings;
+}
+
+absl::StatusOr<SettingsUpdate> ToSettingsUpdate(const v1::UpdateSessionRequest& request) {
+  const v1::SessionSettings& settings = request.session().settings();
+  if (request.update_mask().paths().empty()) return BadField("update_mask", "update_mask names no field");
+  SettingsUpdate update;
+  for (const std::string& path : request.update_mask().paths()) {
+    if (path == "settings.stored_relations") {
+      DYNMESH_ASSIGN_OR_RETURN(update.stored_relations, ToStoredRelations(settings));
+    } else if (path == "settings.checks") {
+      DYNMESH_ASSIGN_OR_RETURN(update.checks, ToLocalCheckSettings(settings.checks()));
+    } else {
+      return BadField("update_mask", absl::StrCat("\"", absl::CHexEscape(path.substr(0, kMaxShownPath)),
+                                                  "\" is not a field that can be changed"));
+    }
+  }
+  return update;
 }
 
 v1::Session FromSessionInfo(const SessionInfo& info) {
@@ -122,6 +132,7 @@ v1::Session FromSessionInfo(const SessionInfo& info) {
     *part->mutable_relation() = FromRelation(stored.relation);
     part->set_memory_bytes(stored.memory_bytes);
   }
+  FromCheckSettings(info.settings.checks, message.mutable_settings()->mutable_checks());
   *message.mutable_create_time() = FromTime(info.create_time);
   *message.mutable_update_time() = FromTime(info.update_time);
   *message.mutable_counts() = FromCounts(info.counts);

@@ -15,10 +15,9 @@ namespace dynmesh {
 
 /// Errors: INVALID_ARGUMENT BAD_ARGUMENT.
 absl::StatusOr<SessionSettings> ToSettings(const v1::SessionSettings& message);
-/// Each storable, and named once. Errors: INVALID_ARGUMENT BAD_ARGUMENT.
-absl::StatusOr<std::vector<Relation>> ToStoredRelations(const v1::SessionSettings& message);
-/// INVALID_ARGUMENT BAD_ARGUMENT unless the mask names fields that UpdateSession can change.
-absl::Status CheckUpdateMask(const google::protobuf::FieldMask& mask);
+/// INVALID_ARGUMENT BAD_ARGUMENT unless the mask names fields that UpdateSession can change, and their values
+/// are good.
+absl::StatusOr<SettingsUpdate> ToSettingsUpdate(const v1::UpdateSessionRequest& request);
 v1::Session FromSessionInfo(const SessionInfo& info);
 
 /// Opaque: the name of the last session of a page.

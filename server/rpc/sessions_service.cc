@@ -43,10 +43,8 @@ absl::Status GetSession(const Session& session, v1::GetSessionResponse* response
 
 absl::Status UpdateSession(Session& session, const v1::UpdateSessionRequest& request, const StopSignal& stop,
                            v1::UpdateSessionResponse* response) {
-  DYNMESH_RETURN_IF_ERROR(CheckUpdateMask(request.update_mask()));
-  DYNMESH_ASSIGN_OR_RETURN(const std::vector<Relation> wanted,
-                           ToStoredRelations(request.session().settings()));
-  DYNMESH_RETURN_IF_ERROR(session.StoreRelations(wanted, request.session().etag(), stop));
+  DYNMESH_ASSIGN_OR_RETURN(const SettingsUpdate update, ToSettingsUpdate(request));
+  DYNMESH_RETURN_IF_ERROR(session.Update(update, request.session().etag(), stop));
   DYNMESH_ASSIGN_OR_RETURN(const SessionInfo info, session.Info());
   *response->mutable_session() = FromSessionInfo(info);
   response->set_revision(info.revision);

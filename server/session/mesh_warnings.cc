@@ -9,7 +9,7 @@ void WarningCollector::Add(WarningKind warning, EntityId id) {
     return entry.warning == warning && entry.kind == id.kind;
   });
   if (found == warnings_.end()) {
-    warnings_.push_back({warning, id.kind, {}, 0});
+    warnings_.push_back({.warning = warning, .kind = id.kind, .ids = {}});
     found = warnings_.end() - 1;
   }
   ++found->count;
@@ -20,7 +20,17 @@ std::vector<MeshWarning> WarningsOf(const BatchResult& result) {
   WarningCollector collector;
   for (EntityId id : result.degenerate) collector.Add(WarningKind::kDegenerateElement, id);
   for (EntityId id : result.duplicate) collector.Add(WarningKind::kDuplicateElement, id);
-  return collector.warnings();
+  std::vector<MeshWarning> warnings = collector.warnings();
+  for (const BatchWarning& found : result.warnings) {
+    warnings.push_back({.warning = WarningKind::kCheckFailed,
+                        .kind = found.kind,
+                        .ids = found.ids,
+                        .count = found.count,
+                        .check = static_cast<CheckKind>(found.check),
+                        .threshold = found.threshold,
+                        .values = found.values});
+  }
+  return warnings;
 }
 
 }  // namespace dynmesh

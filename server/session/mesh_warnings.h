@@ -4,22 +4,28 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/check/check.h"
 #include "core/edit/transaction.h"
 #include "core/mesh/ids.h"
 
 namespace dynmesh {
 
-inline constexpr size_t kMaxWarningIds = 1024;
+inline constexpr size_t kMaxWarningIds = kMaxWarnedIds;
 
-/// What is wrong with elements that were accepted all the same.
-enum class WarningKind { kDegenerateElement, kDuplicateElement };
+/// What is wrong with entities that were accepted all the same.
+enum class WarningKind { kDegenerateElement, kDuplicateElement, kCheckFailed };
 
-/// One kind of warning about elements of one dimension.
+/// One kind of warning about entities of one dimension.
 struct MeshWarning {
   WarningKind warning;
   EntityKind kind;
   std::vector<Slot> ids;  ///< the first kMaxWarningIds
   uint64_t count = 0;     ///< all
+
+  // Of kCheckFailed.
+  CheckKind check = CheckKind::kUnspecified;
+  double threshold = 0;
+  std::vector<double> values = {};  ///< at `ids`
 };
 
 /// Gathers warnings element by element.
@@ -33,6 +39,7 @@ class WarningCollector {
   std::vector<MeshWarning> warnings_;
 };
 
+/// Of added elements, then of checks.
 std::vector<MeshWarning> WarningsOf(const BatchResult& result);
 
 }  // namespace dynmesh

@@ -15,6 +15,11 @@ uint64_t FingerprintOf(const std::string& name, const SessionSettings& settings)
   fingerprint.AddString(name);
   fingerprint.AddNumber(static_cast<uint64_t>(settings.duplicates));
   for (Relation relation : settings.stored_relations) fingerprint.AddNumber(StorableIndex(relation));
+  for (CheckKind check : AllChecks()) {
+    const CheckSetting& setting = settings.checks[check];
+    fingerprint.AddNumber(static_cast<uint64_t>(setting.severity));
+    fingerprint.AddBytes(&setting.threshold, sizeof(setting.threshold));
+  }
   return fingerprint.value();
 }
 

@@ -10,6 +10,7 @@
 #include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
 #include "absl/time/clock.h"
+#include "core/check/neighborhood_check.h"
 #include "core/edit/run_batch.h"
 #include "core/mesh/error.h"
 #include "server/session/catch_exceptions.h"
@@ -51,6 +52,9 @@ size_t BytesOf(const BatchResult& result) {
   for (const EditResult& edit : result.results) {
     bytes += sizeof(edit) + edit.new_slots.size() * sizeof(Slot) + edit.lineage.size() * sizeof(Lineage) +
              edit.skipped.size() * sizeof(uint32_t) + edit.refusals.size() * kRefusalBytes;
+  }
+  for (const BatchWarning& warning : result.warnings) {
+    bytes += sizeof(warning) + warning.ids.size() * (sizeof(Slot) + sizeof(double));
   }
   return bytes;
 }
@@ -121,6 +125,7 @@ Session::Session(const Options& options)
       create_time_(absl::Now()),
       mesh_(MeshOptions{options.settings.duplicates, ToMeshLimits(options.limits)}),
       commit_time_(create_time_),
+      checks_(options.settings.checks),
       spatial_(options.limits.max_session_bytes),
       followers_(options.limits.max_followers),
       deltas_(*this) {
@@ -146,6 +151,7 @@ SessionInfo Session::Describe(const Mesh& mesh, const MeshSummary& summary, absl
   info.name = name();
   info.uid = uid();
   info.settings.duplicates = duplicates();
+  info.settings.checks = checks();
   info.etag = EtagAt(info.revision);
   info.create_time = create_time_;
   info.update_time = update_time;
@@ -193,6 +199,9 @@ absl::StatusOr<Session::AnswerPtr> Session::ApplyLocked(absl::Span<const Edit> e
   batch.max_work = kMaxBatchWork;
   const uint64_t used = std::any_of(edits.begin(), edits.end(), IsOperator) ? mesh_.memory_bytes() : 0;
   batch.max_attribute_bytes = limits().max_session_bytes - std::min(used, limits().max_session_bytes);
+  const CheckSettings settings = checks();
+  NeighborhoodCheck checker(settings);
+  if (settings.AnyOn()) batch.checker = &checker;
   bool returned = false;
   absl::StatusOr<BatchResult> result = CatchExceptions([&] {
     absl::StatusOr<BatchResult> applied = ApplyBatch(mesh_, edits, batch);
@@ -286,13 +295,18 @@ void Session::Committed() {
   for (EntityKind kind : kEntityKinds) num_live_[Dimension(kind)].store(mesh_.NumLive(kind));
 }
 
-absl::Status Session::StoreRelations(absl::Span<const Relation> wanted, absl::string_view etag,
-                                     const StopSignal& stop) {
+absl::Status Session::Update(const SettingsUpdate& update, absl::string_view etag, const StopSignal& stop) {
   WriterMutexLock lock(&mu_);
   DYNMESH_RETURN_IF_ERROR(gone_);
   DYNMESH_RETURN_IF_ERROR(CheckEtag(etag));
-  DYNMESH_RETURN_IF_ERROR(StoreJust(mesh_, wanted, limits().max_session_bytes, stop));
-  MakeRoom(mesh_.memory_bytes());
+  if (update.stored_relations.has_value()) {
+    DYNMESH_RETURN_IF_ERROR(StoreJust(mesh_, *update.stored_relations, limits().max_session_bytes, stop));
+    MakeRoom(mesh_.memory_bytes());
+  }
+  if (update.checks.has_value()) {
+    MutexLock settings_lock(&settings_mu_);
+    checks_ = *update.checks;
+  }
   ++num_updates_;
   return absl::OkStatus();
 }

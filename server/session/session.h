@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "absl/base/thread_annotations.h"
 #include "absl/functional/function_ref.h"
@@ -122,6 +123,7 @@ class Session : public std::enable_shared_from_this<Session> {
   SessionInfo Describe(const Mesh& mesh, const MeshSummary& summary, absl::Time update_time) const;
 
   /// Applies a batch as one revision, all or nothing. Without edits it answers with the current state.
+  /// Makes the checks() of the session on what the batch touches, which may refuse it (NeighborhoodCheck).
   /// Errors: those of ApplyBatch; ABORTED REVISION_MISMATCH (metadata expected, actual); OUT_OF_RANGE
   /// REVISION_IN_FUTURE; INVALID_ARGUMENT REQUEST_ID_REUSED; RESOURCE_EXHAUSTED. Nothing changed then.
   absl::StatusOr<std::shared_ptr<const BatchResult>> Apply(absl::Span<const Edit> edits,
@@ -149,10 +151,22 @@ class Session : public std::enable_shared_from_this<Session> {
                       std::shared_ptr<const RepairOutcome> outcome, size_t bytes)
       ABSL_LOCKS_EXCLUDED(repairs_mu_);
 
-  /// Stores just the relations of `wanted`; no revision is made. All or nothing. Takes the writer lock for as
-  /// long as that takes. Errors: those of StoreJust; ABORTED ETAG_MISMATCH (an empty `etag` fits any).
+  /// Changes settings; no revision is made. All or nothing. Takes the writer lock for as long as that takes.
+  /// Errors: those of StoreJust; ABORTED ETAG_MISMATCH (an empty `etag` fits any).
+  absl::Status Update(const SettingsUpdate& update, absl::string_view etag,
+                      const StopSignal& stop = StopSignal::Never()) ABSL_LOCKS_EXCLUDED(mu_, settings_mu_);
+
+  /// Just the relations of Update().
   absl::Status StoreRelations(absl::Span<const Relation> wanted, absl::string_view etag,
-                              const StopSignal& stop = StopSignal::Never()) ABSL_LOCKS_EXCLUDED(mu_);
+                              const StopSignal& stop = StopSignal::Never()) ABSL_LOCKS_EXCLUDED(mu_) {
+    return Update({.stored_relations = std::vector<Relation>(wanted.begin(), wanted.end())}, etag, stop);
+  }
+
+  /// What is checked of each batch. Never waits.
+  CheckSettings checks() const ABSL_LOCKS_EXCLUDED(settings_mu_) {
+    MutexLock lock(&settings_mu_);
+    return checks_;
+  }
 
   /// FAILED_PRECONDITION SESSION_NOT_EMPTY unless the session is at revision 0. Never waits.
   absl::Status CheckEmpty() const;
@@ -208,6 +222,9 @@ class Session : public std::enable_shared_from_this<Session> {
   std::atomic<int64_t> revision_{0};
   std::atomic<uint64_t> num_updates_{0};  ///< of settings
   std::array<std::atomic<uint32_t>, kNumEntityKinds> num_live_ = {};
+
+  mutable Mutex settings_mu_;
+  CheckSettings checks_ ABSL_GUARDED_BY(settings_mu_);
 
   mutable Mutex imports_mu_;
   AnswerMemory<ImportOutcome> imports_ ABSL_GUARDED_BY(imports_mu_);

@@ -11,6 +11,7 @@
 #include "absl/time/time.h"
 #include "absl/types/optional.h"
 #include "absl/types/span.h"
+#include "core/check/check.h"
 #include "core/mesh/box.h"
 #include "core/mesh/estimate.h"
 #include "core/mesh/mesh.h"
@@ -25,6 +26,13 @@ using KindCounts = std::array<uint64_t, kNumEntityKinds>;
 struct SessionSettings {
   DuplicatePolicy duplicates = DuplicatePolicy::kKeep;  ///< fixed when the session is created
   std::vector<Relation> stored_relations = {};          ///< each of kStorableRelations, once
+  CheckSettings checks = {};                            ///< local ones, made on each batch
+};
+
+/// Settings of a session that are to be changed; those that are absent stay.
+struct SettingsUpdate {
+  absl::optional<std::vector<Relation>> stored_relations = absl::nullopt;
+  absl::optional<CheckSettings> checks = absl::nullopt;
 };
 
 /// A relation that a session keeps stored, and the bytes of its table.

@@ -25,6 +25,12 @@ def two_tets() -> meshio.Mesh:
     return meshio.Mesh(points, [("tetra", [[0, 1, 2, 3], [1, 2, 3, 4]])])
 
 
+def bow_tie() -> meshio.Mesh:
+    """Two triangles that share just vertex 0."""
+    points = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [-1, 0, 0], [-1, -1, 0]], dtype=float)
+    return meshio.Mesh(points, [("triangle", [[0, 1, 2], [0, 3, 4]])])
+
+
 def zoo() -> meshio.Mesh:
     """Every type of element, in meshio's node order.
 

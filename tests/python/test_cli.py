@@ -11,7 +11,7 @@ import sys
 import meshio
 import numpy as np
 import pytest
-from shapes import two_tets, zoo
+from shapes import bow_tie, two_tets, zoo
 
 COMMAND = (
     [os.environ["DYNMESH_COMMAND"]] if "DYNMESH_COMMAND" in os.environ else [sys.executable, "-m", "dynmesh"]
@@ -282,3 +282,23 @@ def test_output_that_nobody_reads_is_no_error(daemon, client):
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         process.stdout.close()
         assert process.wait(30) == 0 and process.stderr.read() == ""
+
+
+def test_the_command_says_by_its_exit_code_whether_something_is_bad(session, run):
+    session.import_mesh(bow_tie())
+    fine = run("check", session.name, "--json")
+    assert fine.returncode == 0, fine.stderr
+    record = json.loads(fine.stdout)
+    assert record["checks"]["vertex_link"]["findings"]["vertex"] == {"ids": [0], "values": [2.0]}
+    assert record["topology"]["surface"]["pieces"] == 2 and record["failed"] == []
+    bad = run("check", session.name, "--only", "vertex_link,quality", "--fail-on", "vertex_link")
+    assert bad.returncode == 1 and "vertex_link" in bad.stderr and "vertex 0" in bad.stdout
+    session.set_checks({"vertex_link": "reject"})
+    rejected = run("check", session.name, "--json")
+    assert rejected.returncode == 1 and json.loads(rejected.stdout)["failed"] == ["vertex_link"]
+    assert "vertex_link: reject" in run("info", session.name).stdout
+
+
+def test_the_command_refuses_checks_that_it_does_not_know(session, run):
+    assert run("check", session.name, "--only", "no_such").returncode == 2
+    assert run("check", session.name, "--only", "quality", "--fail-on", "genus").returncode == 1

@@ -64,6 +64,7 @@ void ServerTest::StartServer(const Limits& limits) {
   sessions_ = v1::SessionService::NewStub(channel);
   edits_ = v1::EditService::NewStub(channel);
   queries_ = v1::QueryService::NewStub(channel);
+  checks_ = v1::CheckService::NewStub(channel);
   subscriptions_ = v1::SubscriptionService::NewStub(channel);
 }
 

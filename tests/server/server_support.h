@@ -13,6 +13,7 @@
 
 #include "core/mesh/error.h"
 #include "core/mesh/mesh.h"
+#include "dynmesh/v1/checks.grpc.pb.h"
 #include "dynmesh/v1/edits.grpc.pb.h"
 #include "dynmesh/v1/queries.grpc.pb.h"
 #include "dynmesh/v1/sessions.grpc.pb.h"
@@ -69,6 +70,7 @@ class ServerTest : public ::testing::Test {
   v1::SessionService::Stub& sessions() { return *sessions_; }
   v1::EditService::Stub& edits() { return *edits_; }
   v1::QueryService::Stub& queries() { return *queries_; }
+  v1::CheckService::Stub& checks() { return *checks_; }
   v1::SubscriptionService::Stub& subscriptions() { return *subscriptions_; }
 
   grpc::Status CreateSession(const std::string& name,
@@ -91,6 +93,7 @@ class ServerTest : public ::testing::Test {
   std::unique_ptr<v1::SessionService::Stub> sessions_;
   std::unique_ptr<v1::EditService::Stub> edits_;
   std::unique_ptr<v1::QueryService::Stub> queries_;
+  std::unique_ptr<v1::CheckService::Stub> checks_;
   std::unique_ptr<v1::SubscriptionService::Stub> subscriptions_;
 };
 

@@ -11,6 +11,15 @@
 ...         mirror.wait(tx.result.revision)
 """
 
+from .checks import (
+    CHECKS,
+    CheckReport,
+    CheckResult,
+    CheckSetting,
+    Findings,
+    MeshTopology,
+    SurfaceTopology,
+)
 from .checksum import Checksum
 from .client import Client, connect
 from .daemon import Daemon, launch
@@ -53,12 +62,16 @@ from .transfer import ImportResult
 __version__ = "0.1.0"
 
 __all__ = [
+    "CHECKS",
     "AbortedError",
     "AlreadyExistsError",
     "Attribute",
     "AttributeSpec",
     "Block",
     "CancelledError",
+    "CheckReport",
+    "CheckResult",
+    "CheckSetting",
     "Checksum",
     "Client",
     "Counts",
@@ -77,12 +90,14 @@ __all__ = [
     "EntityKind",
     "FailedPreconditionError",
     "FileFormatError",
+    "Findings",
     "ImportResult",
     "InternalError",
     "InvalidArgumentError",
     "LaunchError",
     "Lineage",
     "Located",
+    "MeshTopology",
     "MeshWarning",
     "Mirror",
     "MirrorError",
@@ -101,6 +116,7 @@ __all__ = [
     "SessionInfo",
     "Snapshot",
     "Surface",
+    "SurfaceTopology",
     "Transaction",
     "UnauthenticatedError",
     "UnavailableError",

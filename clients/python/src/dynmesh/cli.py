@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from .cli_check import add_check, describe_report, run_check
 from .cli_query import add_questions
 from .cli_repair import add_repair_options, describe_repair, repair, repair_record
 from .cli_watch import watch
@@ -155,6 +156,14 @@ def _add_reading(commands: Any) -> None:
         "file", metavar="FILE", help="its extension chooses meshio's format: .vtu holds everything"
     )
     export.add_argument("--no-slots", action="store_true", help="leave out the ids (dynmesh:slot)")
+    add_check(
+        _command(
+            commands,
+            "check",
+            _check,
+            "Check shapes and topology. Exit code 1 if something is bad that the session rejects, or --fail-on names.",
+        )
+    )
     follow = _command(commands, "watch", _watch, "Follow a session: a line for each step, until interrupted.")
     follow.add_argument("name", metavar="NAME")
     follow.add_argument("--count", metavar="N", type=_positive, help="end after so many steps")
@@ -261,6 +270,15 @@ def _watch(args: argparse.Namespace) -> int:
         return watch(client.session(args.name), args)
 
 
+def _check(args: argparse.Namespace) -> int:
+    with _client(args) as client:
+        report, failed = run_check(client.session(args.name), args)
+    _print(args, {**report.to_dict(), "failed": failed}, describe_report(report))
+    if failed:
+        print(f"dynmesh: bad: {', '.join(failed)}", file=sys.stderr)
+    return _EXIT_ERROR if failed else 0
+
+
 def _query(args: argparse.Namespace) -> None:
     with _client(args) as client:
         record, text = args.ask(client.session(args.name), args)
@@ -354,6 +372,8 @@ def _describe(info: SessionInfo) -> str:
         lines.append(f"bounds     ({low}) to ({high})")
     for (source, target), size in info.stored_relations.items():
         lines.append(f"stored     {source}-{target}: {size / 2**20:.1f} MiB")
+    for name, (severity, threshold) in info.checks.items():
+        lines.append(f"check      {name}: {severity}, threshold {threshold:g}")
     for spec in info.attributes:
         lines.append(f"attribute  {spec.name}: {spec.dtype}[{spec.components}] of {spec.kind}, {spec.policy}")
     return "\n".join(lines)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import uuid
 from collections.abc import Iterable, Iterator
-from types import TracebackType
+from types import MappingProxyType, TracebackType
 
 import grpc
 
 from ._calls import DEFAULT_MAX_MESSAGE_BYTES, Caller
+from .checks import CheckSettings, checks_to_proto
 from .errors import InvalidArgumentError
 from .info import SessionInfo, info_from_proto
 from .relations import RelationLike, relations_to_proto
@@ -73,6 +74,7 @@ class Client:
         *,
         duplicates: str = "keep",
         stored_relations: Iterable[RelationLike] = (),
+        checks: CheckSettings = MappingProxyType({}),
         request_id: str | None = None,
         timeout: float | None = None,
     ) -> Session:
@@ -86,6 +88,8 @@ class Client:
             What happens to an element that equals a live one (same type, same vertices up to symmetry).
         stored_relations : iterable of (kind, kind)
             Relations to keep as tables: as in `Session.store_relations`.
+        checks : mapping of str to severity, or to (severity, threshold)
+            Made on each batch of edits: as in `Session.set_checks`.
         request_id : str, optional
             A retry with the same id gets the first answer. Default: a new one.
 
@@ -96,7 +100,9 @@ class Client:
         if duplicates not in _POLICIES:
             raise InvalidArgumentError(f'duplicates is "keep" or "refuse", not {duplicates!r}')
         settings = sessions_pb2.SessionSettings(
-            duplicate_policy=_POLICIES[duplicates], stored_relations=relations_to_proto(stored_relations)
+            duplicate_policy=_POLICIES[duplicates],
+            stored_relations=relations_to_proto(stored_relations),
+            checks=checks_to_proto(checks),
         )
         request = sessions_pb2.CreateSessionRequest(
             name=name,

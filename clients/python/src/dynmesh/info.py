@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import datetime, timezone
 from typing import Any, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from .arrays import Ids, Points, from_bytes
 from .attribute_types import POLICIES, SCALARS, Policy, default_policy, row_from_bytes
+from .checks import CheckSetting, check_name, checks_from_proto
 from .checksum import Checksum
 from .kinds import EntityKind
 from .relations import Relation, relation_from_proto
@@ -47,6 +51,9 @@ class MeshWarning:
         The first entities that it concerns, at most 1024.
     count : int
         How many it concerns in all.
+    check, threshold, values : str, float, float64[n]
+        Of "CHECK_FAILED": which check of `Session.set_checks`, and what it measured at `ids`. Else "", 0.0 and
+        nothing.
     """
 
     reason: str
@@ -54,6 +61,9 @@ class MeshWarning:
     kind: EntityKind
     ids: Ids
     count: int
+    check: str = ""
+    threshold: float = 0.0
+    values: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
 
     def __str__(self) -> str:
         return f"{self.message} [{self.reason}] ({self.count} {self.kind}(s))"
@@ -76,6 +86,8 @@ class SessionInfo:
         Of the mesh; of the spatial indices, which queries by place make.
     stored_relations : dict of (EntityKind, EntityKind) to int
         Relations that are kept as tables, and the bytes of each, which are part of `memory_bytes`.
+    checks : dict of str to CheckSetting
+        Checks that are made on each batch: `Session.set_checks`.
     bounds : float64[2, 3] or None
         Smallest and largest coordinates; None without vertices.
     """
@@ -98,6 +110,7 @@ class SessionInfo:
     followers: int
     attributes: tuple[AttributeSpec, ...]
     stored_relations: dict[Relation, int]
+    checks: dict[str, CheckSetting]
     bounds: Points | None
 
     def to_dict(self) -> dict[str, Any]:
@@ -123,6 +136,7 @@ class SessionInfo:
             "stored_relations": {
                 f"{source}-{target}": size for (source, target), size in self.stored_relations.items()
             },
+            "checks": {name: setting._asdict() for name, setting in self.checks.items()},
             "bounds": None if self.bounds is None else self.bounds.tolist(),
         }
 
@@ -140,7 +154,16 @@ def checksum_from_proto(message: types_pb2.Checksum) -> Checksum:
 def warning_from_proto(message: types_pb2.Warning) -> MeshWarning:
     """Warning message as `MeshWarning`."""
     kind = EntityKind(message.kind or EntityKind.CELL)
-    return MeshWarning(message.reason, message.message, kind, from_bytes(message.ids, "<u4"), message.count)
+    return MeshWarning(
+        message.reason,
+        message.message,
+        kind,
+        from_bytes(message.ids, "<u4"),
+        message.count,
+        check_name(message.check) if message.check else "",
+        message.threshold,
+        from_bytes(message.values, "<f8"),
+    )
 
 
 def info_from_proto(message: sessions_pb2.Session) -> SessionInfo:
@@ -168,6 +191,7 @@ def info_from_proto(message: sessions_pb2.Session) -> SessionInfo:
             relation_from_proto(stored.relation): stored.memory_bytes
             for stored in message.stored_relations
         },
+        checks=checks_from_proto(message.settings.checks),
         bounds=_bounds(message),
     )
 

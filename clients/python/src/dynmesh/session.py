@@ -25,7 +25,8 @@ from .mirror_state import MirrorState
 from .progress import Progress
 from .relations import RelationLike, relations_to_proto
 from .repairs import RepairResult, RepairStep, choose_steps, read_repair
-from .session_reader import FOREVER, SessionReader
+from .session_checks import SessionChecks
+from .session_reader import FOREVER
 from .transfer import ImportResult, import_requests, read_import
 from .v1 import (
     edits_pb2,
@@ -51,7 +52,7 @@ _CODECS = {
 }
 
 
-class Session(SessionReader):
+class Session(SessionChecks):
     """A session by its name; made by `Client.session` and `Client.create_session`.
 
     Costs nothing to make and holds nothing of the mesh: each method is a call. ``timeout`` is in seconds;
