@@ -213,9 +213,9 @@ absl::Status CheckAll(const Mesh& mesh, const BatchOptions& options, BatchResult
 absl::StatusOr<BatchResult> ApplyBatch(Mesh& mesh, absl::Span<const Edit> edits,
                                        const BatchOptions& options) {
   BatchResult result;
-  const absl::Status applied = RunInBatch(mesh, [&] {
-    const absl::Status applied = ApplyAll(mesh, edits, options, result);
-    return applied.ok() ? CheckAll(mesh, options, result) : applied;
+  const absl::Status applied = RunInBatch(mesh, [&]() -> absl::Status {
+    DYNMESH_RETURN_IF_ERROR(ApplyAll(mesh, edits, options, result));
+    return CheckAll(mesh, options, result);
   });
   if (!applied.ok()) return applied;
   result.checksum = mesh.checksum();

@@ -50,8 +50,8 @@ class FanFinder {
   }
 
  private:
-  template <typename Id>
-  static uint32_t PlaceOf(const std::vector<Id>& sorted, Id id) {
+  template <typename Ids>
+  static uint32_t PlaceOf(const Ids& sorted, typename Ids::value_type id) {
     return std::lower_bound(sorted.begin(), sorted.end(), id) - sorted.begin();
   }
   uint32_t Number(CellId c) const { return PlaceOf(star_.cells, c); }
