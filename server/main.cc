@@ -59,6 +59,10 @@ ABSL_FLAG(uint64_t, max_session_bytes, dynmesh::Limits().max_session_bytes,
 ABSL_FLAG(uint64_t, max_batch_edits, dynmesh::Limits().max_batch_edits, "Edits in a batch");
 ABSL_FLAG(uint64_t, max_batch_items, dynmesh::Limits().max_batch_items,
           "Vertices, elements and rows that the edits of a batch name, and elements that its operators make");
+ABSL_FLAG(uint32_t, max_undo_batches, dynmesh::Limits().max_undo_batches,
+          "Batches of a session that can be undone or redone; 0: none");
+ABSL_FLAG(uint64_t, max_undo_bytes, dynmesh::Limits().max_undo_bytes,
+          "Memory for what undoes and redoes the batches of a session");
 ABSL_FLAG(uint64_t, max_message_bytes, dynmesh::Limits().max_message_bytes, "One request message");
 ABSL_FLAG(uint64_t, max_query_bytes, dynmesh::Limits().max_query_bytes, "One answer of a query or export");
 ABSL_FLAG(uint64_t, max_query_steps, dynmesh::Limits().max_query_steps,
@@ -126,6 +130,8 @@ Limits LimitsFromFlags() {
   limits.max_session_bytes = absl::GetFlag(FLAGS_max_session_bytes);
   limits.max_batch_edits = absl::GetFlag(FLAGS_max_batch_edits);
   limits.max_batch_items = absl::GetFlag(FLAGS_max_batch_items);
+  limits.max_undo_batches = absl::GetFlag(FLAGS_max_undo_batches);
+  limits.max_undo_bytes = absl::GetFlag(FLAGS_max_undo_bytes);
   limits.max_message_bytes = absl::GetFlag(FLAGS_max_message_bytes);
   limits.max_query_bytes = absl::GetFlag(FLAGS_max_query_bytes);
   limits.max_query_steps = absl::GetFlag(FLAGS_max_query_steps);

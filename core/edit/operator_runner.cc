@@ -7,6 +7,7 @@
 #include "core/edit/collapse.h"
 #include "core/edit/merge.h"
 #include "core/edit/remove_vertex.h"
+#include "core/edit/run_batch.h"
 #include "core/edit/split.h"
 #include "core/edit/star.h"
 #include "core/edit/swap.h"
@@ -23,7 +24,7 @@ constexpr uint64_t kWorkToReplace = 10;
 
 /// Whether the state of the mesh speaks against an item, and not what the caller wrote.
 bool IsRefusal(const absl::Status& status) {
-  return absl::IsFailedPrecondition(status) || absl::IsNotFound(status);
+  return absl::IsFailedPrecondition(status) || absl::IsNotFound(status) || absl::IsAborted(status);
 }
 
 absl::Status CheckLimits(const PatchLimits& limits) {
@@ -148,7 +149,7 @@ absl::Status OperatorRunner::Run(const DissolveVerticesEdit& edit) {
 absl::Status OperatorRunner::RunAll(const Items& items, const PatchLimits& limits, Plan plan) {
   DYNMESH_RETURN_IF_ERROR(CheckLimits(limits));
   for (size_t i = 0; i < items.count; ++i) {
-    absl::Status status = RunOne(i, limits, plan);
+    absl::Status status = conflicts_.Explain(RunOne(i, limits, plan));
     if (status.ok()) {
       DYNMESH_RETURN_IF_ERROR(Report(items));
     } else if (options_.skip_refused && IsRefusal(status)) {
@@ -167,9 +168,17 @@ absl::Status OperatorRunner::RunOne(size_t item, const PatchLimits& limits, Plan
   DYNMESH_RETURN_IF_ERROR(planned);
   DYNMESH_RETURN_IF_ERROR(CheckPatch(mesh_, patch_, limits));
   const uint64_t room = options_.max_attribute_bytes - attribute_bytes_;
-  DYNMESH_RETURN_IF_ERROR(ApplyPatch(mesh_, patch_, applied_, room));
+  DYNMESH_RETURN_IF_ERROR(ApplyPlanned(room));
   attribute_bytes_ += applied_.attribute_bytes;
   return absl::OkStatus();
+}
+
+absl::Status OperatorRunner::ApplyPlanned(uint64_t max_attribute_bytes) {
+  const Mesh::Savepoint before = mesh_.MakeSavepoint();
+  DYNMESH_RETURN_IF_ERROR(ApplyPatch(mesh_, patch_, applied_, max_attribute_bytes));
+  absl::Status conflict = conflicts_.CheckSince(before);
+  if (!conflict.ok()) PutBackTo(mesh_, before);
+  return conflict;
 }
 
 /// Counts what was planned, so that few items cannot take long or fill the memory.

@@ -7,6 +7,7 @@
 #include "absl/status/status.h"
 #include "core/edit/apply_patch.h"
 #include "core/edit/batch_names.h"
+#include "core/edit/conflicts.h"
 #include "core/edit/edits.h"
 #include "core/edit/patch.h"
 #include "core/edit/transaction.h"
@@ -23,7 +24,11 @@ namespace dynmesh {
 class OperatorRunner {
  public:
   OperatorRunner(Mesh& mesh, const BatchOptions& options, BatchNames& names, BatchResult& result)
-      : mesh_(mesh), options_(options), names_(names), result_(result) {}
+      : mesh_(mesh),
+        options_(options),
+        conflicts_(mesh, options.conflict_policy, options.as_of_revision),
+        names_(names),
+        result_(result) {}
 
   absl::Status Run(const SplitEdgesEdit& edit);
   absl::Status Run(const CollapseEdgesEdit& edit);
@@ -43,6 +48,7 @@ class OperatorRunner {
 
   absl::Status RunAll(const Items& items, const PatchLimits& limits, Plan plan);
   absl::Status RunOne(size_t item, const PatchLimits& limits, Plan plan);
+  absl::Status ApplyPlanned(uint64_t max_attribute_bytes);
   absl::Status ChargePlanned();
   void Skip(const Items& items, uint32_t index, absl::Status status);
   absl::Status Report(const Items& items);
@@ -50,6 +56,7 @@ class OperatorRunner {
 
   Mesh& mesh_;
   const BatchOptions& options_;
+  const ConflictCheck conflicts_;
   BatchNames& names_;
   BatchResult& result_;
   size_t num_lineage_ = 0;

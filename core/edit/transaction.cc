@@ -6,6 +6,7 @@
 #include "absl/strings/str_cat.h"
 #include "core/edit/bad_argument.h"
 #include "core/edit/batch_names.h"
+#include "core/edit/conflicts.h"
 #include "core/edit/convert_rows.h"
 #include "core/edit/operator_runner.h"
 #include "core/edit/run_batch.h"
@@ -177,11 +178,13 @@ class BatchApplier {
 absl::Status ApplyAll(Mesh& mesh, absl::Span<const Edit> edits, const BatchOptions& options,
                       BatchResult& result) {
   BatchApplier applier(mesh, options, result);
+  const ConflictCheck conflicts(mesh, options.conflict_policy, options.as_of_revision);
   for (size_t i = 0; i < edits.size(); ++i) {
     result.results.emplace_back();
-    if (absl::Status status = std::visit(applier, edits[i]); !status.ok()) {
-      return WithMetadata(status, "edit", absl::StrCat(i));
-    }
+    const Mesh::Savepoint before = mesh.MakeSavepoint();
+    absl::Status status = std::visit(applier, edits[i]);
+    status = status.ok() ? conflicts.CheckSince(before) : conflicts.Explain(status);
+    if (!status.ok()) return WithMetadata(status, "edit", absl::StrCat(i));
   }
   return absl::OkStatus();
 }
@@ -215,7 +218,9 @@ absl::StatusOr<BatchResult> ApplyBatch(Mesh& mesh, absl::Span<const Edit> edits,
   BatchResult result;
   const absl::Status applied = RunInBatch(mesh, [&]() -> absl::Status {
     DYNMESH_RETURN_IF_ERROR(ApplyAll(mesh, edits, options, result));
-    return CheckAll(mesh, options, result);
+    DYNMESH_RETURN_IF_ERROR(CheckAll(mesh, options, result));
+    if (options.make_image && !options.dry_run) result.image = mesh.ImageSince(0);
+    return absl::OkStatus();
   });
   if (!applied.ok()) return applied;
   result.checksum = mesh.checksum();

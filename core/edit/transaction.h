@@ -8,9 +8,11 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "absl/types/optional.h"
 #include "absl/types/span.h"
 #include "core/edit/batch_checker.h"
 #include "core/edit/edits.h"
+#include "core/mesh/batch_image.h"
 #include "core/mesh/mesh.h"
 
 namespace dynmesh {
@@ -50,11 +52,24 @@ struct BatchResult {
   std::vector<EntityId> degenerate;    ///< elements added that name a vertex twice
   std::vector<EntityId> duplicate;     ///< elements added that equal one that was there
   std::vector<BatchWarning> warnings;  ///< of BatchOptions::checker
+  absl::optional<BatchImage> image;    ///< with BatchOptions::make_image
+};
+
+/// What a batch does about changes that somebody else made after as_of_revision.
+enum class ConflictPolicy {
+  kNone,  ///< nothing, as long as the ids still mean the same entities
+  /// Refuses to touch what they changed, with ABORTED CONFLICT (metadata kind, ids, changed_revision): to
+  /// remove it, move it, set its attributes or (of one that others set since) remove these with it, or to add
+  /// elements at vertices that were moved. Ids that are stale, or no elements any more, and vertices that
+  /// others use by now, are conflicts too. With skip_refused an operator's item is passed over for any of
+  /// these.
+  kTouched,
 };
 
 struct BatchOptions {
   /// Ids must name occupants born at or before this revision; later ones: NOT_FOUND ENTITY_REMOVED.
   int64_t as_of_revision = std::numeric_limits<int64_t>::max();
+  ConflictPolicy conflict_policy = ConflictPolicy::kNone;
   /// Roll back after success: the result is what would have been.
   bool dry_run = false;
   /// Items of operators that are refused are reported and passed over. Other edits stay all or nothing.
@@ -71,6 +86,8 @@ struct BatchOptions {
   /// Looks at the mesh after the last edit, and may refuse the batch or add warnings. It may look at max_work
   /// entities, too. Null: nobody looks.
   BatchChecker* checker = nullptr;
+  /// Tell what undoes the batch (RestoreBatches).
+  bool make_image = false;
 };
 
 /// Applies `edits` in order to `mesh`, all or nothing, as one revision.

@@ -2,11 +2,13 @@
 #define DYNMESH_CORE_MESH_JOURNAL_H_
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
 
 #include "core/mesh/checksum.h"
+#include "core/mesh/element_type.h"
 #include "core/mesh/ids.h"
 #include "core/mesh/stamps.h"
 
@@ -14,6 +16,7 @@ namespace dynmesh {
 
 /// The smallest steps that edits are made of; each can be undone when all later ones have been.
 enum class JournalOp : uint8_t {
+  kRecycle,         ///< a slot that the batch had freed is about to be taken; before: Journal::contents
   kCreate,          ///< entity began; a = born stamp before, b = changed stamp before
   kDestroy,         ///< entity ended; its arrays still hold it; b = changed stamp before
   kSetElement,      ///< element flag set; b = changed stamp before
@@ -35,11 +38,20 @@ struct JournalEntry {
   uint32_t b;
 };
 
+/// What the arrays hold at a slot: the entity that was there last. Of a vertex its position is on the stack
+/// of positions.
+struct SlotContent {
+  uint8_t flags = 0;
+  std::array<VertexId, kMaxElementVertices> vertices;
+  std::array<uint32_t, kMaxElementFaces> parts;  ///< of a face its edges, of a cell its oriented faces
+};
+
 /// What Mesh::Rollback undoes, last entry first. Values too large for an entry stand on stacks beside.
 struct Journal {
   std::vector<JournalEntry> entries;
   std::vector<Point> positions;
   std::vector<uint8_t> rows;
+  std::vector<SlotContent> contents;
 
   /// Makes room for `count` entries more.
   void Expect(size_t count) {
@@ -53,6 +65,7 @@ struct Journal {
     Clear(entries, kKeptBytes);
     Clear(positions, kKeptBytes);
     Clear(rows, kKeptBytes);
+    Clear(contents, kKeptBytes);
   }
 
  private:

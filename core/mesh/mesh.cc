@@ -84,10 +84,7 @@ absl::StatusOr<VertexId> Mesh::AddVertex(const Point& position) {
   }
   JournalEntry entry;
   const VertexId v(NewSlot(EntityKind::kVertex, entry));
-  positions_[v.slot()] = position;
-  checksum_.topology += Checksum::VertexTerm(v.slot());
-  checksum_.geometry += Checksum::PositionTerm(v.slot(), position);
-  Touch(v);
+  FillVertex(v, position);
   Record(entry);
   return v;
 }
@@ -107,6 +104,11 @@ absl::Status Mesh::RemoveVertex(VertexId v) {
 absl::Status Mesh::MoveVertex(VertexId v, const Point& position) {
   DYNMESH_RETURN_IF_ERROR(CheckLive(v));
   if (!IsFinite(position)) return NonFinitePosition();
+  MoveTo(v, position);
+  return absl::OkStatus();
+}
+
+void Mesh::MoveTo(VertexId v, const Point& position) {
   Record(
       {JournalOp::kMoveVertex, EntityKind::kVertex, v.slot(), 0, changed(EntityKind::kVertex).At(v.slot())});
   if (journaling()) journal_.positions.push_back(Position(v));
@@ -114,7 +116,6 @@ absl::Status Mesh::MoveVertex(VertexId v, const Point& position) {
   positions_[v.slot()] = position;
   checksum_.geometry += Checksum::PositionTerm(v.slot(), position);
   Touch(v);
-  return absl::OkStatus();
 }
 
 // ---- Attributes ----

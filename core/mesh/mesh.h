@@ -17,6 +17,7 @@
 #include "absl/strings/string_view.h"
 #include "absl/types/span.h"
 #include "core/mesh/attributes.h"
+#include "core/mesh/batch_image.h"
 #include "core/mesh/bit_set.h"
 #include "core/mesh/checksum.h"
 #include "core/mesh/element_type.h"
@@ -40,6 +41,13 @@ class OrientedFace {
 
   constexpr FaceId face() const { return FaceId(packed_ >> 3); }
   constexpr FaceCode code() const { return FaceCode{static_cast<uint8_t>(packed_ & 7)}; }
+  /// The 32 bits.
+  constexpr uint32_t packed() const { return packed_; }
+  static constexpr OrientedFace FromPacked(uint32_t packed) {
+    OrientedFace oriented;
+    oriented.packed_ = packed;
+    return oriented;
+  }
 
  private:
   uint32_t packed_ = kNoSlot;
@@ -293,6 +301,21 @@ class Mesh {
   /// made or removed, what that is made of, and the stars of moved vertices. Errors: those of `meter`.
   /// REQUIRES: a batch is open. Cost: linear in the journal and in these stars, and sorting them.
   absl::StatusOr<EntitySlots> Touched(WorkMeter& meter) const;
+  /// The steps of the open batch so far.
+  const Journal& journal() const { return journal_; }
+  /// What takes the mesh back to where it was at `savepoint` (0: at BeginBatch()) when it is as it is now.
+  /// REQUIRES: a batch is open, and between the two no slot has been given to another entity: Restore() does
+  /// that, but only to slots freed before it was called. Cost: O(n log n) steps since, less where they
+  /// ascend.
+  BatchImage ImageSince(Savepoint savepoint) const;
+  /// Puts back what a batch changed, as edits of the open batch; returns what takes that back in turn. Many
+  /// may follow each other in one batch.
+  /// Errors: INTERNAL when the mesh is seen not to be as that batch left it; RESOURCE_EXHAUSTED when lists of
+  /// incident entities are full. REQUIRES: a batch is open, and is rolled back, to a savepoint before at
+  /// least, after an error. Cost: of the entities in the image, their lists included.
+  absl::StatusOr<BatchImage> Restore(const BatchImage& image);
+  /// What BatchImage::fit says of images that fit the mesh as it is now.
+  BatchImage::Fit FitNow() const;
 
   // ---- Upkeep ----
 
@@ -304,6 +327,7 @@ class Mesh {
   size_t memory_bytes() const;
 
  private:
+  friend class BatchRestorer;
   friend class BulkBuilder;
   friend class MeshValidator;
   friend class RowKernels;
@@ -346,6 +370,8 @@ class Mesh {
   absl::Status CheckVertices(ElementType type, VertexSpan vertices) const;
   absl::Status CheckRoom(ElementType type) const;
   absl::Status CheckRoom(const std::array<uint32_t, kNumEntityKinds>& needed) const;
+  /// The part of it that speaks of incidence lists.
+  absl::Status CheckListRoom(const std::array<uint32_t, kNumEntityKinds>& needed) const;
   absl::Status CheckRemovable(EntityId id) const;
   /// What AddElement does after CheckVertices; the boundary of a cell is left to be settled.
   absl::StatusOr<EntityId> AddChecked(ElementType type, VertexSpan vertices, const SmartEdges& known);
@@ -392,12 +418,20 @@ class Mesh {
   SmartEdges FindSmartEdges(const ElementTemplate& shape, VertexSpan vertices) const;
 
   // mesh_links.cc: creating and destroying single entities with their links, counters and journal
+  void FillVertex(VertexId v, const Point& position);
+  void MoveTo(VertexId v, const Point& position);
   EdgeId CreateEdge(VertexId a, VertexId b, uint8_t extra_flags);
   FaceId CreateFace(VertexSpan vertices, absl::Span<const EdgeId> edges, uint8_t extra_flags);
   CellId CreateCell(ElementType type, VertexSpan vertices, absl::Span<const OrientedFace> faces);
+  /// Make what was allocated an entity, and link it.
+  void FillEdge(EdgeId e, const std::array<VertexId, 2>& ends, uint8_t extra_flags);
+  void FillFace(FaceId f, VertexSpan vertices, absl::Span<const EdgeId> edges, uint8_t extra_flags);
+  void FillCell(CellId c, ElementType type, VertexSpan vertices, absl::Span<const OrientedFace> faces);
   void DestroyVertex(VertexId v);
   void DestroyEdge(EdgeId e);
   void DestroyFace(FaceId f);
+  void EndEdge(EdgeId e);  ///< DestroyEdge, but no duplicate becomes primary
+  void EndFace(FaceId f);
   void DestroyCell(CellId c);
   bool IsUnneeded(EdgeId e) const;
   bool IsUnneeded(FaceId f) const;
@@ -450,6 +484,9 @@ class Mesh {
 
   // mesh_storage.cc: rows by slot
   Slot NewSlot(EntityKind kind, JournalEntry& entry);
+  /// Allocates a slot that had an occupant before, also one that the batch has freed: what it holds is saved.
+  void RetakeSlot(EntityId id, JournalEntry& entry);
+  void SaveContent(EntityId id);
   void EnsureRow(EntityKind kind, Slot slot);
   void WidenFaces(int stride);
   void WidenCells(int vertex_stride, int face_stride);
@@ -459,6 +496,7 @@ class Mesh {
     if (batch_open_) journal_.entries.push_back(entry);
   }
   void Undo(const JournalEntry& entry);
+  void UndoRecycle(EntityId id);
   void UndoCreate(const JournalEntry& entry);
   void UndoDestroy(const JournalEntry& entry);
   void UndoMove(const JournalEntry& entry);

@@ -69,6 +69,10 @@ absl::Status Mesh::CheckRoom(const std::array<uint32_t, kNumEntityKinds>& needed
       return LimitExceeded(kLimitNames[kind], limit, uint64_t{slots_[kind].num_live()} + needed[kind]);
     }
   }
+  return CheckListRoom(needed);
+}
+
+absl::Status Mesh::CheckListRoom(const std::array<uint32_t, kNumEntityKinds>& needed) const {
   if (!vertex_edges_.HasRoom(2 * needed[1]) || !edge_faces_.HasRoom(kMaxFaceVertices * needed[2]) ||
       !face_overflow_.HasRoom(kMaxElementFaces * needed[3]) ||
       !stored_.HasRoom(kMaxElementFaces * 2 * StoredRows::kMaxRow)) {

@@ -9,21 +9,39 @@ namespace dynmesh {
 
 // ---- Create ----
 
+void Mesh::FillVertex(VertexId v, const Point& position) {
+  positions_[v.slot()] = position;
+  checksum_.topology += Checksum::VertexTerm(v.slot());
+  checksum_.geometry += Checksum::PositionTerm(v.slot(), position);
+  Touch(v);
+}
+
 EdgeId Mesh::CreateEdge(VertexId a, VertexId b, uint8_t extra_flags) {
   JournalEntry entry;
   const EdgeId e(NewSlot(EntityKind::kEdge, entry));
-  edge_vertices_[e.slot()] = {a, b};
-  flags(e) = static_cast<uint8_t>(ElementType::kWireEdge) | extra_flags | (a == b ? kDegenerateFlag : 0);
+  FillEdge(e, {a, b}, extra_flags);
+  Record(entry);
+  return e;
+}
+
+void Mesh::FillEdge(EdgeId e, const std::array<VertexId, 2>& ends, uint8_t extra_flags) {
+  edge_vertices_[e.slot()] = ends;
+  flags(e) =
+      static_cast<uint8_t>(ElementType::kWireEdge) | extra_flags | (ends[0] == ends[1] ? kDegenerateFlag : 0);
   if (IsDuplicate(e)) CountDuplicate(e, +1);
   LinkEdge(e);
   if (IsElement(e)) CountElement(e, +1);
-  Record(entry);
-  return e;
 }
 
 FaceId Mesh::CreateFace(VertexSpan vertices, absl::Span<const EdgeId> edges, uint8_t extra_flags) {
   JournalEntry entry;
   const FaceId f(NewSlot(EntityKind::kFace, entry));
+  FillFace(f, vertices, edges, extra_flags);
+  Record(entry);
+  return f;
+}
+
+void Mesh::FillFace(FaceId f, VertexSpan vertices, absl::Span<const EdgeId> edges, uint8_t extra_flags) {
   const size_t row = size_t{f.slot()} * face_stride_;
   for (size_t k = 0; k < 3; ++k) {  // known to the compiler, which else calls memmove
     face_vertices_[row + k] = vertices[k];
@@ -38,21 +56,23 @@ FaceId Mesh::CreateFace(VertexSpan vertices, absl::Span<const EdgeId> edges, uin
   if (IsDuplicate(f)) CountDuplicate(f, +1);
   LinkFace(f);
   if (IsElement(f)) CountElement(f, +1);
-  Record(entry);
-  return f;
 }
 
 CellId Mesh::CreateCell(ElementType type, VertexSpan vertices, absl::Span<const OrientedFace> faces) {
   JournalEntry entry;
   const CellId c(NewSlot(EntityKind::kCell, entry));
+  FillCell(c, type, vertices, faces);
+  Record(entry);
+  return c;
+}
+
+void Mesh::FillCell(CellId c, ElementType type, VertexSpan vertices, absl::Span<const OrientedFace> faces) {
   std::copy(vertices.begin(), vertices.end(),
             cell_vertices_.begin() + size_t{c.slot()} * cell_vertex_stride_);
   std::copy(faces.begin(), faces.end(), cell_faces_.begin() + size_t{c.slot()} * cell_face_stride_);
   flags(c) = static_cast<uint8_t>(type) | kElementFlag | (HasRepeats(vertices) ? kDegenerateFlag : 0);
   LinkCell(c);
   CountElement(c, +1);
-  Record(entry);
-  return c;
 }
 
 // ---- Destroy ----
@@ -67,21 +87,29 @@ void Mesh::DestroyVertex(VertexId v) {
 }
 
 void Mesh::DestroyEdge(EdgeId e) {
+  EndEdge(e);
+  PassOnPrimary(e);
+}
+
+void Mesh::EndEdge(EdgeId e) {
   ResetAttributes(e);
   Record({JournalOp::kDestroy, EntityKind::kEdge, e.slot(), 0, 0});
   if (IsDuplicate(e)) CountDuplicate(e, -1);
   UnlinkEdge(e);
   mutable_slots(EntityKind::kEdge).Free(e.slot());
-  PassOnPrimary(e);
 }
 
 void Mesh::DestroyFace(FaceId f) {
+  EndFace(f);
+  PassOnPrimary(f);
+}
+
+void Mesh::EndFace(FaceId f) {
   ResetAttributes(f);
   Record({JournalOp::kDestroy, EntityKind::kFace, f.slot(), 0, 0});
   if (IsDuplicate(f)) CountDuplicate(f, -1);
   UnlinkFace(f);
   mutable_slots(EntityKind::kFace).Free(f.slot());
-  PassOnPrimary(f);
 }
 
 void Mesh::DestroyCell(CellId c) {

@@ -1,7 +1,7 @@
 // Undoing journal entries, last first.
 //
 // A slot that was freed in the batch has had no other occupant since, so the arrays still hold what stood
-// there: putting an entity back means linking it again.
+// there, or are given it again by kRecycle: putting an entity back means linking it again.
 
 #include "core/mesh/mesh.h"
 
@@ -26,6 +26,8 @@ void Mesh::RollbackTo(Savepoint savepoint) {
 void Mesh::Undo(const JournalEntry& entry) {
   const EntityId id(entry.kind, entry.slot);
   switch (entry.op) {
+    case JournalOp::kRecycle:
+      return UndoRecycle(id);
     case JournalOp::kCreate:
       return UndoCreate(entry);
     case JournalOp::kDestroy:
@@ -77,6 +79,32 @@ void Mesh::UndoCreate(const JournalEntry& entry) {
   if (IsDuplicate(id)) CountDuplicate(id, -1);
   mutable_slots(entry.kind).UndoAllocate(entry.slot, entry.a);
   changed_[Dimension(entry.kind)].Restore(entry.slot, entry.b);
+}
+
+void Mesh::UndoRecycle(EntityId id) {
+  mutable_slots(id.kind).UndoRecycle(id.slot);
+  if (id.kind == EntityKind::kVertex) {
+    positions_[id.slot] = journal_.positions.back();
+    return journal_.positions.pop_back();
+  }
+  const SlotContent& content = journal_.contents.back();
+  flags(id) = content.flags;
+  const size_t num_vertices = NumVertices(Type(id));
+  const auto end = content.vertices.begin() + num_vertices;
+  if (id.kind == EntityKind::kEdge) {
+    std::copy(content.vertices.begin(), end, edge_vertices_[id.slot].begin());
+  } else if (id.kind == EntityKind::kFace) {
+    const size_t row = size_t{id.slot} * face_stride_;
+    std::copy(content.vertices.begin(), end, face_vertices_.begin() + row);
+    std::transform(content.parts.begin(), content.parts.begin() + num_vertices, face_edges_.begin() + row,
+                   [](Slot slot) { return EdgeId(slot); });
+  } else {
+    std::copy(content.vertices.begin(), end, cell_vertices_.begin() + size_t{id.slot} * cell_vertex_stride_);
+    std::transform(content.parts.begin(), content.parts.begin() + TemplateOf(Type(id)).num_faces,
+                   cell_faces_.begin() + size_t{id.slot} * cell_face_stride_,
+                   [](uint32_t packed) { return OrientedFace::FromPacked(packed); });
+  }
+  journal_.contents.pop_back();
 }
 
 void Mesh::UndoDestroy(const JournalEntry& entry) {

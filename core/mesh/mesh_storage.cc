@@ -1,5 +1,6 @@
 // Rows of the arrays: growing, widening, counting bytes.
 
+#include <algorithm>
 #include <numeric>
 
 #include "absl/strings/str_cat.h"
@@ -38,6 +39,35 @@ Slot Mesh::NewSlot(EntityKind kind, JournalEntry& entry) {
   if (at_end) EnsureRow(kind, slot);
   if (stored_.any()) stored_.Begin({kind, slot});
   return slot;
+}
+
+void Mesh::RetakeSlot(EntityId id, JournalEntry& entry) {
+  if (journaling()) journal_.Expect(2);
+  Slots& slots = mutable_slots(id.kind);
+  if (!slots.IsFree(id.slot)) {
+    SaveContent(id);
+    Record({JournalOp::kRecycle, id.kind, id.slot, 0, 0});
+    slots.Recycle(id.slot);
+  }
+  const Slots::Allocation taken = slots.AllocateAt(id.slot, next_stamp());
+  entry = {JournalOp::kCreate, id.kind, id.slot, taken.born_before, changed(id.kind).At(id.slot)};
+  if (stored_.any()) stored_.Begin(id);
+}
+
+void Mesh::SaveContent(EntityId id) {
+  if (id.kind == EntityKind::kVertex) return journal_.positions.push_back(Position(VertexId(id.slot)));
+  SlotContent& content = journal_.contents.emplace_back();
+  content.flags = flags(id);
+  const auto vertices = VerticesOf(id);
+  std::copy(vertices.begin(), vertices.end(), content.vertices.begin());
+  if (id.kind == EntityKind::kFace) {
+    const auto edges = Edges(FaceId(id.slot));
+    std::transform(edges.begin(), edges.end(), content.parts.begin(), [](EdgeId e) { return e.slot(); });
+  } else if (id.kind == EntityKind::kCell) {
+    const auto faces = Faces(CellId(id.slot));
+    std::transform(faces.begin(), faces.end(), content.parts.begin(),
+                   [](OrientedFace oriented) { return oriented.packed(); });
+  }
 }
 
 void Mesh::EnsureRow(EntityKind kind, Slot slot) {
@@ -119,7 +149,8 @@ std::vector<std::pair<std::string, size_t>> Mesh::MemoryByArray() const {
       {"edge->faces", edge_faces_.memory_bytes()},
       {"hub faces", hub_faces_.size() * (sizeof(CycleKey) + sizeof(FaceId) + 1)},
       {"hub edges", hub_edges_.capacity() * (sizeof(std::pair<VertexId, VertexId>) + sizeof(EdgeId) + 1)},
-      {"journal", Bytes(journal_.entries) + Bytes(journal_.positions) + Bytes(journal_.rows)},
+      {"journal",
+       Bytes(journal_.entries) + Bytes(journal_.positions) + Bytes(journal_.rows) + Bytes(journal_.contents)},
   };
   for (EntityKind kind : kEntityKinds) {
     const int k = Dimension(kind);

@@ -15,7 +15,7 @@ namespace dynmesh {
 ///
 /// A freed slot goes into quarantine until EndQuarantine() (called at each commit), so within a batch no
 /// slot has two occupants; what stood in its arrays stays readable and can be put back. After that the
-/// lowest free slot is handed out first.
+/// lowest free slot is handed out first. Only who saves what the arrays hold may Recycle() a slot sooner.
 /// Cost: all O(1), but Allocate which skips 4096 used slots at a time.
 class Slots {
  public:
@@ -39,6 +39,15 @@ class Slots {
     born_.Touch(slot, born);
     live_.Set(slot);
     return {slot, born_before, at_end};
+  }
+
+  /// Allocates this slot, which a former occupant is to have again. REQUIRES: IsFree(slot).
+  Allocation AllocateAt(Slot slot, Stamp born) {
+    const Stamp born_before = born_.At(slot);
+    free_.Clear(slot);
+    born_.Touch(slot, born);
+    live_.Set(slot);
+    return {slot, born_before, /*at_end=*/false};
   }
 
   /// Allocates slots 0 to count - 1. REQUIRES: none was ever used.
@@ -76,12 +85,22 @@ class Slots {
     }
   }
 
+  /// Makes a quarantined slot free for AllocateAt(), which must follow.
+  void Recycle(Slot slot) { free_.Set(slot); }
+
+  /// Undoes Recycle(slot). REQUIRES: what was allocated there since is undone.
+  void UndoRecycle(Slot slot) { free_.Clear(slot); }
+
   /// Slots freed so far may be handed out again.
   void EndQuarantine() {
-    for (Slot slot : quarantine_) MakeFree(slot);
+    for (Slot slot : quarantine_) {
+      if (!live_.Test(slot)) MakeFree(slot);  // else it was recycled
+    }
     quarantine_.clear();
   }
 
+  /// Whether the slot had an occupant and may have another one now.
+  bool IsFree(Slot slot) const { return free_.Test(slot); }
   bool IsLive(Slot slot) const { return live_.Test(slot); }
   /// Revision at which the present or last occupant was born; 0: the slot was never used.
   Stamp Born(Slot slot) const { return slot < limit_ ? born_.At(slot) : 0; }
@@ -91,11 +110,11 @@ class Slots {
   uint32_t num_live() const { return live_.size(); }
   /// One past the highest slot that was ever used.
   Slot limit() const { return limit_; }
-  /// Whether no slot is live and free or quarantined, and none lies beyond the limit.
+  /// Whether no slot is free and live or quarantined, and none lies beyond the limit.
   bool IsSound() const {
     bool sound = live_.Next(limit_) == kNoSlot && free_.Next(limit_) == kNoSlot;
     free_.ForEach([&](Slot slot) { sound = sound && !live_.Test(slot); });
-    for (Slot slot : quarantine_) sound = sound && !live_.Test(slot) && !free_.Test(slot);
+    for (Slot slot : quarantine_) sound = sound && !free_.Test(slot);
     return sound;
   }
   void Reserve(size_t slots) { born_.Reserve(slots); }

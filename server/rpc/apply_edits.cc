@@ -13,8 +13,8 @@ absl::Status ApplyEdits(Session& session, const v1::ApplyEditsRequest& request,
                         v1::ApplyEditsResponse* response) {
   DYNMESH_RETURN_IF_ERROR(CheckMessageSize(request, session.limits()));
   DYNMESH_ASSIGN_OR_RETURN(const std::vector<Edit> edits, ToEdits(request, session.limits()));
-  DYNMESH_ASSIGN_OR_RETURN(const std::shared_ptr<const BatchResult> result,
-                           session.Apply(edits, ToApplyOptions(request)));
+  DYNMESH_ASSIGN_OR_RETURN(const ApplyOptions options, ToApplyOptions(request));
+  DYNMESH_ASSIGN_OR_RETURN(const std::shared_ptr<const BatchResult> result, session.Apply(edits, options));
   FromBatchResult(*result, response);
   return absl::OkStatus();
 }

@@ -188,6 +188,44 @@ void FromEditResult(const EditResult& result, v1::EditResult* message) {
   FromLineage(result.lineage, message);
 }
 
+KindCounts ToKindCounts(const std::array<uint32_t, kNumEntityKinds>& live) {
+  KindCounts counts;
+  std::copy(live.begin(), live.end(), counts.begin());
+  return counts;
+}
+
+absl::StatusOr<ConflictPolicy> ToConflictPolicy(v1::ConflictPolicy policy) {
+  switch (policy) {
+    case v1::CONFLICT_POLICY_UNSPECIFIED:
+      return ConflictPolicy::kNone;
+    case v1::CONFLICT_POLICY_TOUCHED:
+      return ConflictPolicy::kTouched;
+    default:
+      return BadField("conflict_policy", "a policy that this server does not know");
+  }
+}
+
+/// Of UndoEditsRequest and RedoEditsRequest, which say the same.
+template <typename Request>
+HistoryOptions HistoryOptionsOf(const Request& request) {
+  HistoryOptions options;
+  if (request.count() != 0) options.count = request.count();
+  if (request.has_if_revision()) options.if_revision = request.if_revision();
+  options.request_id = request.request_id();
+  options.validate_only = request.validate_only();
+  return options;
+}
+
+template <typename Response>
+void FillFrom(const HistoryResult& result, Response* response) {
+  response->set_revision(result.revision);
+  response->set_count(result.count);
+  *response->mutable_checksum() = FromChecksum(result.checksum);
+  *response->mutable_counts() = FromCounts(ToKindCounts(result.counts));
+  response->set_undoable_batches(result.undoable_batches);
+  response->set_redoable_batches(result.redoable_batches);
+}
+
 }  // namespace
 
 absl::StatusOr<std::vector<Edit>> ToEdits(const v1::ApplyEditsRequest& request, const Limits& limits) {
@@ -203,8 +241,9 @@ absl::StatusOr<std::vector<Edit>> ToEdits(const v1::ApplyEditsRequest& request, 
   return edits;
 }
 
-ApplyOptions ToApplyOptions(const v1::ApplyEditsRequest& request) {
+absl::StatusOr<ApplyOptions> ToApplyOptions(const v1::ApplyEditsRequest& request) {
   ApplyOptions options;
+  DYNMESH_ASSIGN_OR_RETURN(options.conflict_policy, ToConflictPolicy(request.conflict_policy()));
   options.as_of_revision = request.as_of_revision();
   if (request.has_if_revision()) options.if_revision = request.if_revision();
   options.request_id = request.request_id();
@@ -214,15 +253,25 @@ ApplyOptions ToApplyOptions(const v1::ApplyEditsRequest& request) {
   return options;
 }
 
+HistoryOptions ToHistoryOptions(const v1::UndoEditsRequest& request) { return HistoryOptionsOf(request); }
+
+HistoryOptions ToHistoryOptions(const v1::RedoEditsRequest& request) { return HistoryOptionsOf(request); }
+
+void FromHistoryResult(const HistoryResult& result, v1::UndoEditsResponse* response) {
+  FillFrom(result, response);
+}
+
+void FromHistoryResult(const HistoryResult& result, v1::RedoEditsResponse* response) {
+  FillFrom(result, response);
+}
+
 void FromBatchResult(const BatchResult& result, v1::ApplyEditsResponse* response) {
   response->set_revision(result.revision);
   for (const EditResult& edit : result.results) {
     FromEditResult(edit, response->add_results());
   }
   *response->mutable_checksum() = FromChecksum(result.checksum);
-  KindCounts counts;
-  std::copy(result.counts.begin(), result.counts.end(), counts.begin());
-  *response->mutable_counts() = FromCounts(counts);
+  *response->mutable_counts() = FromCounts(ToKindCounts(result.counts));
   for (const MeshWarning& warning : WarningsOf(result)) *response->add_warnings() = FromWarning(warning);
 }
 

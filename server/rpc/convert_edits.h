@@ -14,9 +14,15 @@ namespace dynmesh {
 /// (max_batch_edits).
 absl::StatusOr<std::vector<Edit>> ToEdits(const v1::ApplyEditsRequest& request, const Limits& limits);
 
-ApplyOptions ToApplyOptions(const v1::ApplyEditsRequest& request);
+/// Errors: INVALID_ARGUMENT BAD_ARGUMENT.
+absl::StatusOr<ApplyOptions> ToApplyOptions(const v1::ApplyEditsRequest& request);
+HistoryOptions ToHistoryOptions(const v1::UndoEditsRequest& request);
+HistoryOptions ToHistoryOptions(const v1::RedoEditsRequest& request);
 
 void FromBatchResult(const BatchResult& result, v1::ApplyEditsResponse* response);
+
+void FromHistoryResult(const HistoryResult& result, v1::UndoEditsResponse* response);
+void FromHistoryResult(const HistoryResult& result, v1::RedoEditsResponse* response);
 
 /// `status` in band. REQUIRES: !status.ok().
 void FromError(const absl::Status& status, v1::EditError* error);

@@ -143,6 +143,9 @@ v1::Session FromSessionInfo(const SessionInfo& info) {
   *message.mutable_checksum() = FromChecksum(info.checksum);
   message.set_memory_bytes(info.memory_bytes);
   message.set_index_bytes(info.index_bytes);
+  message.set_undoable_batches(info.undoable_batches);
+  message.set_redoable_batches(info.redoable_batches);
+  message.set_history_bytes(info.history_bytes);
   message.set_followers(info.followers);
   for (const AttributeSpec& spec : info.attributes) *message.add_attributes() = FromAttributeSpec(spec);
   if (info.bounds.has_value()) {

@@ -3,11 +3,30 @@
 #include "core/mesh/error.h"
 #include "dynmesh/v1/edits.grpc.pb.h"
 #include "server/rpc/apply_edits.h"
+#include "server/rpc/call_stop.h"
+#include "server/rpc/convert_edits.h"
 #include "server/rpc/stream_edits_reactor.h"
 #include "server/rpc/unary.h"
 
 namespace dynmesh {
 namespace {
+
+/// UndoEdits or RedoEdits.
+template <typename Request, typename Response>
+grpc::ServerUnaryReactor* MoveInHistory(const UnaryCall& call, HistoryMove move, const Request& request,
+                                        Response* response) {
+  // One batch is undone in about the time that it took; many may take longer.
+  const bool heavy = request.count() > 1;
+  return RunOnSession(call, request.session(), {AccessMode::kWrite, heavy, request.ByteSizeLong()},
+                      [context = call.context, move, &request, response](const SessionPtr& session,
+                                                                         AccessGrant) -> absl::Status {
+                        DYNMESH_ASSIGN_OR_RETURN(
+                            const std::shared_ptr<const HistoryResult> result,
+                            session->MoveInHistory(move, ToHistoryOptions(request), CallStop(context)));
+                        FromHistoryResult(*result, response);
+                        return absl::OkStatus();
+                      });
+}
 
 class EditsService final : public v1::EditService::CallbackService {
  public:
@@ -21,6 +40,18 @@ class EditsService final : public v1::EditService::CallbackService {
                         [request, response](const SessionPtr& session, AccessGrant) {
                           return dynmesh::ApplyEdits(*session, *request, response);
                         });
+  }
+
+  grpc::ServerUnaryReactor* UndoEdits(grpc::CallbackServerContext* context,
+                                      const v1::UndoEditsRequest* request,
+                                      v1::UndoEditsResponse* response) override {
+    return MoveInHistory({"UndoEdits", context, services_}, HistoryMove::kUndo, *request, response);
+  }
+
+  grpc::ServerUnaryReactor* RedoEdits(grpc::CallbackServerContext* context,
+                                      const v1::RedoEditsRequest* request,
+                                      v1::RedoEditsResponse* response) override {
+    return MoveInHistory({"RedoEdits", context, services_}, HistoryMove::kRedo, *request, response);
   }
 
   grpc::ServerBidiReactor<v1::StreamEditsRequest, v1::StreamEditsResponse>* StreamEdits(

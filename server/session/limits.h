@@ -26,6 +26,9 @@ struct Limits {
   /// Edits in a batch; vertices, elements and rows that these name, and as many elements that operators make.
   uint64_t max_batch_edits = 100'000;
   uint64_t max_batch_items = 1'000'000;
+  /// What is kept of a session to undo and redo batches: so many at most, and so many bytes.
+  uint32_t max_undo_batches = 100;
+  uint64_t max_undo_bytes = uint64_t{64} << 20;
   /// One request message.
   uint64_t max_message_bytes = uint64_t{4} << 20;
   /// One answer of a query or export, which is gathered in memory so that it speaks of one revision.

@@ -38,6 +38,7 @@ uint64_t FingerprintOf(absl::Span<const Edit> edits, const ApplyOptions& options
   fingerprint.AddNumber(options.if_revision.value_or(0));
   fingerprint.AddNumber(options.skip_refused);
   fingerprint.AddNumber(options.report_lineage);
+  fingerprint.AddNumber(static_cast<uint64_t>(options.conflict_policy));
   for (const Edit& edit : edits) fingerprint.AddEdit(edit);
   return fingerprint.value();
 }
@@ -126,6 +127,7 @@ Session::Session(const Options& options)
       mesh_(MeshOptions{options.settings.duplicates, ToMeshLimits(options.limits)}),
       commit_time_(create_time_),
       checks_(options.settings.checks),
+      history_(options.limits),
       spatial_(options.limits.max_session_bytes),
       followers_(options.limits.max_followers),
       deltas_(*this) {
@@ -156,6 +158,9 @@ SessionInfo Session::Describe(const Mesh& mesh, const MeshSummary& summary, absl
   info.create_time = create_time_;
   info.update_time = update_time;
   info.index_bytes = spatial_.memory_bytes();
+  info.history_bytes = history_bytes_.load();
+  info.undoable_batches = num_undoable_.load();
+  info.redoable_batches = num_redoable_.load();
   info.followers = followers_.size();
   return info;
 }
@@ -195,6 +200,8 @@ absl::StatusOr<Session::AnswerPtr> Session::ApplyLocked(absl::Span<const Edit> e
   batch.dry_run = options.validate_only;
   batch.skip_refused = options.skip_refused;
   if (options.report_lineage) batch.max_lineage = kMaxLineage;
+  batch.conflict_policy = options.conflict_policy;
+  batch.make_image = history_.keeps_batches();
   batch.max_made = limits().max_batch_items;
   batch.max_work = kMaxBatchWork;
   const uint64_t used = std::any_of(edits.begin(), edits.end(), IsOperator) ? mesh_.memory_bytes() : 0;
@@ -202,21 +209,27 @@ absl::StatusOr<Session::AnswerPtr> Session::ApplyLocked(absl::Span<const Edit> e
   const CheckSettings settings = checks();
   NeighborhoodCheck checker(settings);
   if (settings.AnyOn()) batch.checker = &checker;
-  bool returned = false;
-  absl::StatusOr<BatchResult> result = CatchExceptions([&] {
-    absl::StatusOr<BatchResult> applied = ApplyBatch(mesh_, edits, batch);
-    returned = true;
-    return applied;
+  absl::StatusOr<BatchResult> result;
+  const absl::Status applied = RunEdit([&] {
+    result = ApplyBatch(mesh_, edits, batch);
+    return result.status();
   });
-  if (!returned) return Damage(result.status());
-  if (!result.ok()) return result.status();
+  if (!applied.ok()) return applied;
   items_since_check_ += result->num_made;
+  if (result->image.has_value()) history_.Add(*std::exchange(result->image, absl::nullopt), mesh_.revision());
   if (!options.validate_only) Committed();
   return std::make_shared<const BatchResult>(*std::move(result));
 }
 
-absl::Status Session::Damage(const absl::Status& failure) {
-  spdlog::error("session_damaged name={} error=\"{}\"", name(), failure.ToString());
+absl::Status Session::RunEdit(absl::FunctionRef<absl::Status()> fn) {
+  bool returned = false;
+  const absl::Status status = CatchExceptions([&] {
+    absl::Status edited = fn();
+    returned = true;
+    return edited;
+  });
+  if (returned) return status;
+  spdlog::error("session_damaged name={} error=\"{}\"", name(), status.ToString());
   gone_ = SessionDamaged(name());
   return gone_;
 }
@@ -237,29 +250,40 @@ absl::Status Session::EditMesh(absl::FunctionRef<absl::StatusOr<BatchEnding>(Mes
 
 absl::StatusOr<BatchEnding> Session::EditLocked(
     absl::FunctionRef<absl::StatusOr<BatchEnding>(Mesh&)> edit) {
-  bool returned = false;
-  const absl::StatusOr<BatchEnding> ending = CatchExceptions([&]() -> absl::StatusOr<BatchEnding> {
-    absl::StatusOr<BatchEnding> wanted;
-    absl::Status status = RunInBatch(mesh_, [&] { return (wanted = edit(mesh_)).status(); });
-    if (status.ok()) {
-      if (*wanted == BatchEnding::kCommit) status = mesh_.Commit();
-      if (*wanted == BatchEnding::kRollBack || !status.ok()) mesh_.Rollback();
-    }
-    returned = true;
-    return status.ok() ? wanted : status;
-  });
-  if (!returned) return Damage(ending.status());
-  if (!ending.ok()) return ending;
+  absl::StatusOr<BatchEnding> wanted;
+  absl::optional<BatchImage> image;
+  const auto edit_and_note = [&] {
+    wanted = edit(mesh_);
+    const bool is_kept = wanted.ok() && *wanted == BatchEnding::kCommit && history_.keeps_batches();
+    if (is_kept) image = mesh_.ImageSince(0);
+    return wanted.status();
+  };
+  DYNMESH_RETURN_IF_ERROR(RunEdit([&] {
+    absl::Status status = RunInBatch(mesh_, edit_and_note);
+    if (!status.ok()) return status;
+    if (*wanted == BatchEnding::kCommit) status = mesh_.Commit();
+    if (*wanted == BatchEnding::kRollBack || !status.ok()) mesh_.Rollback();
+    return status;
+  }));
+  if (image.has_value()) history_.Add(*std::move(image), mesh_.revision());
   items_since_check_ = kItemsBetweenChecks;
   MakeRoom(mesh_.memory_bytes());
-  return ending;
+  return wanted;
 }
 
 absl::Status Session::CheckRevisions(const ApplyOptions& options) const {
   const int64_t now = mesh_.revision();
   if (options.as_of_revision < 0) return BadField("as_of_revision", "as_of_revision is negative");
+  if (options.as_of_revision == 0 && options.conflict_policy == ConflictPolicy::kTouched) {
+    return BadField("as_of_revision", "conflict_policy says nothing without as_of_revision");
+  }
   if (options.as_of_revision > now) return RevisionInFuture(options.as_of_revision, now);
-  const int64_t expected = options.if_revision.value_or(now);
+  return CheckRevision(options.if_revision);
+}
+
+absl::Status Session::CheckRevision(absl::optional<int64_t> if_revision) const {
+  const int64_t now = mesh_.revision();
+  const int64_t expected = if_revision.value_or(now);
   return expected == now ? absl::OkStatus() : RevisionMismatch(expected, now);
 }
 
@@ -278,7 +302,9 @@ absl::Status Session::CheckMemory(absl::Span<const Edit> edits) {
 }
 
 void Session::MakeRoom(uint64_t mesh_bytes) {
-  if (mesh_bytes + spatial_.memory_bytes() > limits().max_session_bytes) spatial_.Clear();
+  const uint64_t max_bytes = limits().max_session_bytes;
+  if (mesh_bytes + spatial_.memory_bytes() + history_.memory_bytes() > max_bytes) spatial_.Clear();
+  history_.ShrinkTo(max_bytes - std::min(mesh_bytes, max_bytes));
 }
 
 Session::AnswerPtr Session::Unchanged() const {
@@ -293,6 +319,10 @@ void Session::Committed() {
   commit_time_ = absl::Now();
   revision_.store(mesh_.revision());
   for (EntityKind kind : kEntityKinds) num_live_[Dimension(kind)].store(mesh_.NumLive(kind));
+  history_.Follow(mesh_.revision());
+  num_undoable_.store(history_.size(HistoryMove::kUndo));
+  num_redoable_.store(history_.size(HistoryMove::kRedo));
+  history_bytes_.store(history_.memory_bytes());
 }
 
 absl::Status Session::Update(const SettingsUpdate& update, absl::string_view etag, const StopSignal& stop) {

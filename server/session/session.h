@@ -22,10 +22,12 @@
 #include "server/session/answer_memory.h"
 #include "server/session/delta_source.h"
 #include "server/session/follower_list.h"
+#include "server/session/history.h"
 #include "server/session/limits.h"
 #include "server/session/mutex.h"
 #include "server/session/session_info.h"
 #include "server/session/shared_spatial_index.h"
+#include "server/session/stop_signal.h"
 #include "server/session/workers.h"
 
 namespace dynmesh {
@@ -38,6 +40,26 @@ struct ApplyOptions {
   bool validate_only = false;
   bool skip_refused = false;    ///< items of operators
   bool report_lineage = false;  ///< of at most kMaxLineage elements
+  /// kTouched takes an as_of_revision.
+  ConflictPolicy conflict_policy = ConflictPolicy::kNone;
+};
+
+/// How batches are to be undone or redone; the fields are those of UndoEditsRequest.
+struct HistoryOptions {
+  uint32_t count = 1;
+  absl::optional<int64_t> if_revision = absl::nullopt;
+  std::string request_id = {};  ///< as of ApplyOptions
+  bool validate_only = false;
+};
+
+/// What undoing or redoing did or, for validate_only, would have done.
+struct HistoryResult {
+  int64_t revision = 0;  ///< after it; for validate_only: before
+  uint32_t count = 0;    ///< of batches
+  Checksum checksum;
+  std::array<uint32_t, kNumEntityKinds> counts = {};
+  uint32_t undoable_batches = 0;  ///< after it
+  uint32_t redoable_batches = 0;
 };
 
 /// So many elements that operators made can be told of in one answer, which is then some 4 MB.
@@ -65,7 +87,7 @@ absl::Status CheckSessionName(absl::string_view name);
 /// A named mesh with its revision, its lock and its followers.
 ///
 ///     Session ── AccessQueue ── calls that wait for their turn
-///        ├────── mu_ (reader/writer) ── Mesh, commit time, answers to request ids
+///        ├────── mu_ (reader/writer) ── Mesh, commit time, History, answers to request ids
 ///        ├────── SharedSpatialIndex ── read under the reader lock, with locks of its own
 ///        ├────── FollowerList ── Follower ── DeltaSink (an RPC stream)
 ///        └────── DeltaSource ── encoded payloads shared by followers, quantisation grids
@@ -137,6 +159,14 @@ class Session : public std::enable_shared_from_this<Session> {
   absl::Status EditMesh(absl::FunctionRef<absl::StatusOr<BatchEnding>(Mesh&)> edit,
                         absl::FunctionRef<void(const Mesh&)> ended) ABSL_LOCKS_EXCLUDED(mu_);
 
+  /// Undoes the last batches, or redoes those that were undone last, all or nothing, as one revision.
+  /// Errors: FAILED_PRECONDITION NOTHING_TO_UNDO or NOTHING_TO_REDO when there are not as many; ABORTED
+  /// REVISION_MISMATCH; INVALID_ARGUMENT REQUEST_ID_REUSED; RESOURCE_EXHAUSTED; those of `stop`. Nothing
+  /// changed then.
+  absl::StatusOr<std::shared_ptr<const HistoryResult>> MoveInHistory(
+      HistoryMove move, const HistoryOptions& options, const StopSignal& stop = StopSignal::Never())
+      ABSL_LOCKS_EXCLUDED(mu_);
+
   /// What the import `request_id` gave, nullptr if there was none. Errors: INVALID_ARGUMENT
   /// REQUEST_ID_REUSED. Never waits.
   absl::StatusOr<std::shared_ptr<const ImportOutcome>> FindImport(absl::string_view request_id,
@@ -190,20 +220,27 @@ class Session : public std::enable_shared_from_this<Session> {
 
  private:
   using AnswerPtr = std::shared_ptr<const BatchResult>;
+  using HistoryAnswerPtr = std::shared_ptr<const HistoryResult>;
 
   std::string EtagAt(int64_t revision) const;
   absl::Status CheckEtag(absl::string_view etag) const ABSL_SHARED_LOCKS_REQUIRED(mu_);
   absl::Status CheckRevisions(const ApplyOptions& options) const ABSL_SHARED_LOCKS_REQUIRED(mu_);
+  absl::Status CheckRevision(absl::optional<int64_t> if_revision) const ABSL_SHARED_LOCKS_REQUIRED(mu_);
   absl::StatusOr<AnswerPtr> ApplyLocked(absl::Span<const Edit> edits, const ApplyOptions& options)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
   absl::StatusOr<AnswerPtr> ApplyOnce(absl::Span<const Edit> edits, const ApplyOptions& options,
                                       uint64_t fingerprint) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
   absl::StatusOr<BatchEnding> EditLocked(absl::FunctionRef<absl::StatusOr<BatchEnding>(Mesh&)> edit)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
-  /// Ends this after a failure half way of an edit.
-  absl::Status Damage(const absl::Status& failure) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
+  absl::StatusOr<HistoryAnswerPtr> MoveOnce(HistoryMove move, const HistoryOptions& options,
+                                            const StopSignal& stop) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
+  absl::StatusOr<HistoryAnswerPtr> MoveLocked(HistoryMove move, const HistoryOptions& options,
+                                              const StopSignal& stop) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
+  /// The result of fn(), which edits mesh_. When that throws, an edit has been left half way: the session is
+  /// damaged then, and its error is returned.
+  absl::Status RunEdit(absl::FunctionRef<absl::Status()> fn) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
   absl::Status CheckMemory(absl::Span<const Edit> edits) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
-  /// An index can be made again: it goes when the mesh needs its room.
+  /// An index can be made again: it goes when the mesh needs its room, and what undoes batches goes next.
   void MakeRoom(uint64_t mesh_bytes) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
   AnswerPtr Unchanged() const ABSL_SHARED_LOCKS_REQUIRED(mu_);
   void Committed() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
@@ -219,9 +256,13 @@ class Session : public std::enable_shared_from_this<Session> {
   absl::Status gone_ ABSL_GUARDED_BY(mu_);  ///< not OK: deleted, or damaged by a failure half way
   uint64_t items_since_check_ ABSL_GUARDED_BY(mu_) = 0;
   AnswerMemory<BatchResult> answers_ ABSL_GUARDED_BY(mu_);
+  History history_ ABSL_GUARDED_BY(mu_);
+  AnswerMemory<HistoryResult> history_answers_ ABSL_GUARDED_BY(mu_);
   std::atomic<int64_t> revision_{0};
   std::atomic<uint64_t> num_updates_{0};  ///< of settings
   std::array<std::atomic<uint32_t>, kNumEntityKinds> num_live_ = {};
+  std::atomic<uint32_t> num_undoable_{0}, num_redoable_{0};
+  std::atomic<uint64_t> history_bytes_{0};
 
   mutable Mutex settings_mu_;
   CheckSettings checks_ ABSL_GUARDED_BY(settings_mu_);

@@ -32,6 +32,20 @@ absl::Status RevisionMismatch(int64_t expected, int64_t actual) {
                    {{"expected", absl::StrCat(expected)}, {"actual", absl::StrCat(actual)}});
 }
 
+absl::Status NothingToUndo(uint64_t requested, uint64_t available) {
+  return FailedPrecondition(
+      reason::kNothingToUndo,
+      absl::StrCat(available, " batches can be undone, and ", requested, " were asked for"),
+      {{"requested", absl::StrCat(requested)}, {"available", absl::StrCat(available)}});
+}
+
+absl::Status NothingToRedo(uint64_t requested, uint64_t available) {
+  return FailedPrecondition(
+      reason::kNothingToRedo,
+      absl::StrCat(available, " batches can be redone, and ", requested, " were asked for"),
+      {{"requested", absl::StrCat(requested)}, {"available", absl::StrCat(available)}});
+}
+
 absl::Status SessionNotFound(absl::string_view name) {
   return MakeError(absl::StatusCode::kNotFound, reason::kSessionNotFound,
                    absl::StrCat("there is no session ", name), {{"session", std::string(name)}});

@@ -28,6 +28,10 @@ absl::Status RevisionInFuture(int64_t requested, int64_t actual);
 /// ABORTED REVISION_MISMATCH, metadata expected and actual.
 absl::Status RevisionMismatch(int64_t expected, int64_t actual);
 
+/// FAILED_PRECONDITION NOTHING_TO_UNDO or NOTHING_TO_REDO, metadata requested and available: batches.
+absl::Status NothingToUndo(uint64_t requested, uint64_t available);
+absl::Status NothingToRedo(uint64_t requested, uint64_t available);
+
 /// NOT_FOUND SESSION_NOT_FOUND.
 absl::Status SessionNotFound(absl::string_view name);
 

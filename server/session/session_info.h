@@ -66,8 +66,11 @@ struct SessionInfo {
   KindCounts element_counts = {};
   int64_t euler_characteristic = 0;
   Checksum checksum;
-  uint64_t memory_bytes = 0;  ///< of the mesh
-  uint64_t index_bytes = 0;   ///< of its spatial indices
+  uint64_t memory_bytes = 0;   ///< of the mesh
+  uint64_t index_bytes = 0;    ///< of its spatial indices
+  uint64_t history_bytes = 0;  ///< of what undoes and redoes batches
+  uint32_t undoable_batches = 0;
+  uint32_t redoable_batches = 0;
   uint32_t followers = 0;
   std::vector<AttributeSpec> attributes;
   std::vector<StoredRelation> stored_relations;  ///< those of settings, in that order

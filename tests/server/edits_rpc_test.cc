@@ -199,6 +199,17 @@ std::vector<RefusalCase> RefusalCases() {
        "actual", "3"},
       {"negative revision", [](R* r) { r->set_as_of_revision(-1); }, grpc::INVALID_ARGUMENT,
        reason::kBadArgument, "field", "as_of_revision"},
+      {"conflict",
+       [=](R* r) {
+         r->set_as_of_revision(2);
+         r->set_conflict_policy(v1::CONFLICT_POLICY_TOUCHED);
+         r->add_edits()->mutable_remove_vertices()->set_ids(ids({5, 4}));
+       },
+       grpc::ABORTED, reason::kConflict, "ids", "4"},
+      {"conflict with what", [](R* r) { r->set_conflict_policy(v1::CONFLICT_POLICY_TOUCHED); },
+       grpc::INVALID_ARGUMENT, reason::kBadArgument, "field", "as_of_revision"},
+      {"odd conflict policy", [](R* r) { r->set_conflict_policy(static_cast<v1::ConflictPolicy>(7)); },
+       grpc::INVALID_ARGUMENT, reason::kBadArgument, "field", "conflict_policy"},
       {"other revision", [](R* r) { r->set_if_revision(1); }, grpc::ABORTED, reason::kRevisionMismatch,
        "expected", "1"},
       {"long request id", [](R* r) { r->set_request_id(std::string(129, 'r')); }, grpc::INVALID_ARGUMENT,

@@ -189,6 +189,26 @@ void ExpectSameBoundary(const Mesh& mesh, const Oracle& oracle) {
   }
 }
 
+void AppendEntity(const Mesh& mesh, EntityId id, std::string& text) {
+  if (id.kind == EntityKind::kVertex) {
+    for (double x : mesh.Position(VertexId(id.slot))) absl::StrAppend(&text, " ", x);
+  } else {
+    absl::StrAppend(&text, " element ", mesh.IsElement(id), " duplicate ", mesh.IsDuplicate(id), " vertices");
+    for (VertexId v : mesh.VerticesOf(id)) absl::StrAppend(&text, " ", v.slot());
+  }
+  for (EntityKind to : kEntityKinds) {
+    std::vector<Slot> neighbors;
+    AppendNeighbors(mesh, {id.kind, to}, id.slot, neighbors);
+    absl::StrAppend(&text, " ->", EntityKindName(to));
+    for (Slot neighbor : neighbors) absl::StrAppend(&text, " ", neighbor);
+  }
+}
+
+void AppendRow(const AttributeColumn& column, Slot slot, std::string& text) {
+  for (uint8_t byte : column.Row(slot)) absl::StrAppend(&text, " ", int{byte});
+  absl::StrAppend(&text, "\n");
+}
+
 }  // namespace
 
 ElementModel ModelOf(const Mesh& mesh) {
@@ -242,20 +262,7 @@ std::string Describe(const Mesh& mesh) {
       const EntityId id(kind, slot);
       absl::StrAppend(&text, "  ", slot, " live ", mesh.IsLive(id), " born ", mesh.slots(kind).Born(slot),
                       " changed ", mesh.changed(kind).At(slot), " boundary ", mesh.IsOnBoundary(id));
-      if (mesh.IsLive(id) && kind != EntityKind::kVertex) {
-        absl::StrAppend(&text, " element ", mesh.IsElement(id), " duplicate ", mesh.IsDuplicate(id),
-                        " vertices");
-        for (VertexId v : mesh.VerticesOf(id)) absl::StrAppend(&text, " ", v.slot());
-      } else if (mesh.IsLive(id)) {
-        for (double x : mesh.Position(VertexId(slot))) absl::StrAppend(&text, " ", x);
-      }
-      for (EntityKind to : kEntityKinds) {
-        if (!mesh.IsLive(id)) break;
-        std::vector<Slot> neighbors;
-        AppendNeighbors(mesh, {kind, to}, slot, neighbors);
-        absl::StrAppend(&text, " ->", EntityKindName(to));
-        for (Slot neighbor : neighbors) absl::StrAppend(&text, " ", neighbor);
-      }
+      if (mesh.IsLive(id)) AppendEntity(mesh, id, text);
       absl::StrAppend(&text, "\n");
     }
   }
@@ -263,9 +270,30 @@ std::string Describe(const Mesh& mesh) {
     absl::StrAppend(&text, "attribute ", column.spec().name, "\n");
     for (Slot slot = 0; slot < mesh.slots(column.spec().kind).limit(); ++slot) {
       absl::StrAppend(&text, "  ", column.stamps().At(slot));
-      for (uint8_t byte : column.Row(slot)) absl::StrAppend(&text, " ", int{byte});
-      absl::StrAppend(&text, "\n");
+      AppendRow(column, slot, text);
     }
+  }
+  return text;
+}
+
+std::string DescribeContent(const Mesh& mesh, size_t num_columns) {
+  std::string text =
+      absl::StrCat("checksum ", mesh.checksum().topology, " ", mesh.checksum().geometry, "\n");
+  for (EntityKind kind : kEntityKinds) {
+    absl::StrAppend(&text, EntityKindName(kind), " elements ", mesh.NumElements(kind), "\n");
+    mesh.slots(kind).live().ForEach([&](Slot slot) {
+      absl::StrAppend(&text, "  ", slot, " boundary ", mesh.IsOnBoundary({kind, slot}));
+      AppendEntity(mesh, {kind, slot}, text);
+      absl::StrAppend(&text, "\n");
+    });
+  }
+  for (size_t i = 0; i < num_columns; ++i) {
+    const AttributeColumn& column = mesh.attributes()[i];
+    absl::StrAppend(&text, "attribute ", column.spec().name, "\n");
+    mesh.slots(column.spec().kind).live().ForEach([&](Slot slot) {
+      absl::StrAppend(&text, "  ", slot);
+      AppendRow(column, slot, text);
+    });
   }
   return text;
 }

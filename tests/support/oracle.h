@@ -35,6 +35,10 @@ void ExpectEqualsOracle(const Mesh& mesh, const ElementModel& model);
 /// Equal texts mean equal meshes but for the order within upward lists.
 std::string Describe(const Mesh& mesh);
 
+/// The same without what undoing does not bring back: revision, stamps, and slots that nobody lives in. Of
+/// attributes the first `num_columns`.
+std::string DescribeContent(const Mesh& mesh, size_t num_columns);
+
 }  // namespace dynmesh::testing
 
 #endif  // DYNMESH_TESTS_SUPPORT_ORACLE_H_

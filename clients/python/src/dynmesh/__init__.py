@@ -25,12 +25,13 @@ from .client import Client, connect
 from .daemon import Daemon, launch
 from .delta import Delta
 from .edit import EditBatch, Transaction
-from .edit_result import EditResult, Lineage, Refusal
+from .edit_result import EditResult, HistoryResult, Lineage, Refusal
 from .edit_stream import EditStream
 from .errors import (
     AbortedError,
     AlreadyExistsError,
     CancelledError,
+    ConflictError,
     DataLossError,
     DeadlineExceededError,
     DynmeshError,
@@ -74,6 +75,7 @@ __all__ = [
     "CheckSetting",
     "Checksum",
     "Client",
+    "ConflictError",
     "Counts",
     "Csr",
     "Daemon",
@@ -91,6 +93,7 @@ __all__ = [
     "FailedPreconditionError",
     "FileFormatError",
     "Findings",
+    "HistoryResult",
     "ImportResult",
     "InternalError",
     "InvalidArgumentError",

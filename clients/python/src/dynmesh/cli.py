@@ -20,6 +20,7 @@ from .cli_repair import add_repair_options, describe_repair, repair, repair_reco
 from .cli_watch import watch
 from .client import DEFAULT_TARGET, DEFAULT_TIMEOUT_S, Client, connect
 from .daemon import find_daemon
+from .edit_result import HistoryResult
 from .errors import DynmeshError
 from .files import read_mesh
 from .info import SessionInfo
@@ -125,6 +126,10 @@ def _add_writing(commands: Any) -> None:
     mend = _command(commands, "repair", _repair, help_text)
     mend.add_argument("name", metavar="NAME")
     add_repair_options(mend)
+    for name, text in (("undo", "Take the last batches of edits back."), ("redo", "Do undone batches again.")):
+        step = _command(commands, name, _undo if name == "undo" else _redo, text)
+        step.add_argument("name", metavar="NAME")
+        step.add_argument("count", metavar="N", nargs="?", type=_positive, default=1, help="batches (1)")
     remove = _command(commands, "rm", _rm, "Delete a session. Asks first when typed at a terminal.")
     remove.add_argument("name", metavar="NAME")
     remove.add_argument("--yes", action="store_true", help="do not ask")
@@ -239,6 +244,16 @@ def _repair(args: argparse.Namespace) -> None:
     _print(args, repair_record(result), describe_repair(result))
 
 
+def _undo(args: argparse.Namespace) -> None:
+    with _client(args) as client:
+        _print_history(args, "undid", client.session(args.name).undo(args.count))
+
+
+def _redo(args: argparse.Namespace) -> None:
+    with _client(args) as client:
+        _print_history(args, "redid", client.session(args.name).redo(args.count))
+
+
 def _export(args: argparse.Namespace) -> None:
     with _client(args) as client:
         snapshot = client.session(args.name).export(args.file, slots=not args.no_slots)
@@ -342,6 +357,12 @@ def _print_import(args: argparse.Namespace, result: ImportResult) -> None:
     _print_info(args, result.info)
 
 
+def _print_history(args: argparse.Namespace, did: str, result: HistoryResult) -> None:
+    text = f"{did} {result.count} batch(es): {args.name} is at revision {result.revision}"
+    left = f"{result.undoable_batches} can be undone, {result.redoable_batches} redone"
+    _print(args, {"name": args.name, **result.to_dict()}, f"{text}; {left}")
+
+
 def _print_info(args: argparse.Namespace, info: SessionInfo) -> None:
     _print(args, info.to_dict(), _describe(info))
 
@@ -366,7 +387,10 @@ def _describe(info: SessionInfo) -> str:
     memory = f"memory     {info.memory_bytes / 2**20:.1f} MiB"
     if info.index_bytes:
         memory += f", and {info.index_bytes / 2**20:.1f} MiB of spatial indices"
+    if info.history_bytes:
+        memory += f", and {info.history_bytes / 2**20:.1f} MiB of history"
     lines += [memory, f"followers  {info.followers}"]
+    lines.append(f"history    {info.undoable_batches} batches to undo, {info.redoable_batches} to redo")
     if info.bounds is not None:
         low, high = (" ".join(f"{x:g}" for x in corner) for corner in info.bounds)
         lines.append(f"bounds     ({low}) to ({high})")

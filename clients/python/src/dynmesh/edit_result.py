@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -10,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from .arrays import Ids, from_bytes
 from .checksum import Checksum
 from .handles import NEW_VERTEX, to_wire
-from .info import Counts, MeshWarning
+from .info import Counts, MeshWarning, checksum_from_proto, counts_from_proto
 from .v1 import edits_pb2
 
 
@@ -105,6 +106,46 @@ class EditResult:
         handles = (ids & NEW_VERTEX) != 0
         ids[handles] = self.new_vertices[ids[handles] & ~np.uint32(NEW_VERTEX)]
         return ids
+
+
+@dataclass(frozen=True)
+class HistoryResult:
+    """What undoing or redoing batches did or, if it was only validated, would have done.
+
+    Attributes
+    ----------
+    revision : int
+        After it; of ``validate_only`` the revision before.
+    count : int
+        Batches that were undone or redone.
+    checksum, counts : Checksum, Counts
+        Of the session then.
+    undoable_batches, redoable_batches : int
+        What can be undone and redone now.
+    """
+
+    revision: int
+    count: int
+    checksum: Checksum
+    counts: Counts
+    undoable_batches: int
+    redoable_batches: int
+
+    def to_dict(self) -> dict[str, Any]:
+        """The same in the types of JSON; the checksum is a hexadecimal string."""
+        return asdict(self) | {"checksum": str(self.checksum), "counts": self.counts._asdict()}
+
+
+def history_from_proto(reply: edits_pb2.UndoEditsResponse | edits_pb2.RedoEditsResponse) -> HistoryResult:
+    """The answer to UndoEdits or RedoEdits."""
+    return HistoryResult(
+        revision=reply.revision,
+        count=reply.count,
+        checksum=checksum_from_proto(reply.checksum),
+        counts=counts_from_proto(reply.counts),
+        undoable_batches=reply.undoable_batches,
+        redoable_batches=reply.redoable_batches,
+    )
 
 
 def refusal_from_proto(item: edits_pb2.SkippedItem) -> Refusal:

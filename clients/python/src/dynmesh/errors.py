@@ -49,7 +49,7 @@ class DynmeshError(Exception):
 
     @property
     def ids(self) -> tuple[int, ...]:
-        """Ids that offended: the first 16 of them at most."""
+        """Ids that offended: the first 16 of them at most, of a conflict the first 100."""
         return tuple(int(part) for part in self.metadata.get("ids", "").split(",") if part.isdigit())
 
     @property
@@ -81,6 +81,16 @@ class FailedPreconditionError(DynmeshError, RuntimeError):
 
 class AbortedError(DynmeshError, RuntimeError):
     """Somebody else changed it first."""
+
+
+class ConflictError(AbortedError):
+    """Somebody else changed what the batch touches: ``conflict_policy="touched"``. Read again, and try again."""
+
+    @property
+    def changed_revision(self) -> int | None:
+        """The latest revision that changed one of `ids`."""
+        text = self.metadata.get("changed_revision", "")
+        return int(text) if text.isdigit() else None
 
 
 class OutOfRangeError(DynmeshError, IndexError):
@@ -135,6 +145,8 @@ class FileFormatError(InvalidArgumentError):
     """A mesh file that meshio cannot read or write."""
 
 
+_BY_REASON: dict[str, type[DynmeshError]] = {"CONFLICT": ConflictError}
+
 _BY_CODE: dict[int, type[DynmeshError]] = {
     1: CancelledError,
     3: InvalidArgumentError,
@@ -156,8 +168,9 @@ _BY_CODE: dict[int, type[DynmeshError]] = {
 def make_error(
     code: int, message: str, reason: str = "", metadata: Mapping[str, str] | None = None
 ) -> DynmeshError:
-    """The error of a google.rpc.Code; codes that have no class of their own give `InternalError`."""
-    return _BY_CODE.get(code, InternalError)(message, reason=reason, metadata=metadata)
+    """The error of a reason or google.rpc.Code; codes that have no class of their own give `InternalError`."""
+    kind = _BY_REASON.get(reason) or _BY_CODE.get(code, InternalError)
+    return kind(message, reason=reason, metadata=metadata)
 
 
 def from_rpc_error(error: grpc.RpcError) -> DynmeshError:

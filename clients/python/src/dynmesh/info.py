@@ -84,6 +84,8 @@ class SessionInfo:
         V - E + F - C.
     memory_bytes, index_bytes : int
         Of the mesh; of the spatial indices, which queries by place make.
+    undoable_batches, redoable_batches, history_bytes : int
+        Batches that `Session.undo` and `Session.redo` can take back and do again, and what these occupy.
     stored_relations : dict of (EntityKind, EntityKind) to int
         Relations that are kept as tables, and the bytes of each, which are part of `memory_bytes`.
     checks : dict of str to CheckSetting
@@ -107,6 +109,9 @@ class SessionInfo:
     checksum: Checksum
     memory_bytes: int
     index_bytes: int
+    undoable_batches: int
+    redoable_batches: int
+    history_bytes: int
     followers: int
     attributes: tuple[AttributeSpec, ...]
     stored_relations: dict[Relation, int]
@@ -131,6 +136,9 @@ class SessionInfo:
             "checksum": str(self.checksum),
             "memory_bytes": self.memory_bytes,
             "index_bytes": self.index_bytes,
+            "undoable_batches": self.undoable_batches,
+            "redoable_batches": self.redoable_batches,
+            "history_bytes": self.history_bytes,
             "followers": self.followers,
             "attributes": [{**spec._asdict(), "kind": str(spec.kind)} for spec in self.attributes],
             "stored_relations": {
@@ -185,6 +193,9 @@ def info_from_proto(message: sessions_pb2.Session) -> SessionInfo:
         checksum=checksum_from_proto(message.checksum),
         memory_bytes=message.memory_bytes,
         index_bytes=message.index_bytes,
+        undoable_batches=message.undoable_batches,
+        redoable_batches=message.redoable_batches,
+        history_bytes=message.history_bytes,
         followers=message.followers,
         attributes=tuple(_spec_from_proto(spec) for spec in message.attributes),
         stored_relations={

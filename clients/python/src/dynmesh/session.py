@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import uuid
 from collections.abc import Callable, Collection, Iterable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import grpc
 from google.protobuf import field_mask_pb2
@@ -14,7 +14,7 @@ from ._calls import Caller
 from .arrays import as_int64
 from .delta import HAS_NATIVE
 from .edit import EditBatch, Transaction
-from .edit_result import EditResult
+from .edit_result import EditResult, HistoryResult, history_from_proto
 from .edit_stream import EditStream
 from .errors import InvalidArgumentError, UnimplementedError
 from .files import PathLike, read_mesh
@@ -44,6 +44,10 @@ if TYPE_CHECKING:
 _MAX_INTERVAL_S = 3600
 
 _SLOT_ORDERS = {"caller": sessions_pb2.SLOT_ORDER_CALLER, "hilbert": sessions_pb2.SLOT_ORDER_HILBERT}
+_CONFLICT_POLICIES = {
+    "ignore": edits_pb2.CONFLICT_POLICY_UNSPECIFIED,
+    "touched": edits_pb2.CONFLICT_POLICY_TOUCHED,
+}
 _CODECS = {
     "auto": subscriptions_pb2.DELTA_CODEC_UNSPECIFIED,
     "raw": subscriptions_pb2.DELTA_CODEC_RAW,
@@ -188,6 +192,7 @@ class Session(SessionChecks):
         validate_only: bool = False,
         skip_refused: bool = False,
         report_lineage: bool = False,
+        conflict_policy: str = "ignore",
         timeout: float | None = None,
     ) -> Transaction:
         """A batch of edits, sent as one revision when its ``with`` block ends without an exception.
@@ -210,6 +215,11 @@ class Session(SessionChecks):
             Other edits stay all or nothing.
         report_lineage : bool
             Tell which elements splits, collapses and swaps made of which: see `EditResult.lineage`.
+        conflict_policy : "ignore" or "touched"
+            "touched": refused with `ConflictError` when somebody else changed, after ``as_of_revision``, what the
+            batch touches: what it removes, moves or sets attributes of, and vertices of elements that it adds. So
+            editors in different regions never refuse each other, and in the same one no change is overwritten.
+            With ``skip_refused``, items of splits, collapses and swaps that conflict are passed over.
         """
         options = {
             "as_of_revision": as_of_revision,
@@ -218,6 +228,7 @@ class Session(SessionChecks):
             "validate_only": validate_only,
             "skip_refused": skip_refused,
             "report_lineage": report_lineage,
+            "conflict_policy": conflict_policy,
         }
         return Transaction(lambda batch: self.apply(batch, timeout=timeout, **options))  # type: ignore[arg-type]
 
@@ -231,6 +242,7 @@ class Session(SessionChecks):
         validate_only: bool = False,
         skip_refused: bool = False,
         report_lineage: bool = False,
+        conflict_policy: str = "ignore",
         timeout: float | None = None,
     ) -> EditResult:
         """Sends a batch that was collected without a ``with`` block. Parameters as in `edit`."""
@@ -243,6 +255,7 @@ class Session(SessionChecks):
             validate_only=validate_only,
             skip_refused=skip_refused,
             report_lineage=report_lineage,
+            conflict_policy=_conflict_policy(conflict_policy),
         )
         return batch.read(self._caller.unary(self._edits.ApplyEdits, request, timeout, repeatable=True))
 
@@ -252,10 +265,12 @@ class Session(SessionChecks):
         as_of_revision: int = 0,
         skip_refused: bool = False,
         report_lineage: bool = False,
+        conflict_policy: str = "ignore",
         window: int = 64,
     ) -> EditStream:
         """Pipelined edits: up to `window` batches are on their way at once. Other parameters as in `edit`."""
         read_at = as_int64(as_of_revision, "as_of_revision")
+        policy = _conflict_policy(conflict_policy)
 
         def make_request(batch: EditBatch) -> edits_pb2.ApplyEditsRequest:
             return edits_pb2.ApplyEditsRequest(
@@ -265,6 +280,7 @@ class Session(SessionChecks):
                 request_id=_new_request_id(),
                 skip_refused=skip_refused,
                 report_lineage=report_lineage,
+                conflict_policy=policy,
             )
 
         return EditStream(self._edits.StreamEdits, make_request, window, self._caller.check_size)
@@ -326,6 +342,62 @@ class Session(SessionChecks):
         with Progress("repairing", progress) as bar:
             return read_repair(self._caller.stream(self._repairs.RepairSession, request, seconds), chosen, bar)
 
+    def undo(
+        self,
+        count: int = 1,
+        *,
+        if_revision: int | None = None,
+        request_id: str | None = None,
+        validate_only: bool = False,
+        timeout: float | None = None,
+    ) -> HistoryResult:
+        """Takes the last `count` batches back, whoever sent them, all or nothing, as one new revision.
+
+        Ids, positions and attributes are as before the batches; columns that they added stay, without their rows.
+        `SessionInfo.undoable_batches` says how many there are: 100 unless the server is told otherwise, fewer when
+        they are large. An import cannot be undone.
+
+        Parameters
+        ----------
+        if_revision, request_id, validate_only
+            As in `edit`. ``if_revision`` makes sure that nobody's batch came last but the one that is meant.
+
+        Raises
+        ------
+        FailedPreconditionError
+            NOTHING_TO_UNDO: there are fewer than `count`. Nothing is undone then.
+        """
+        request = edits_pb2.UndoEditsRequest(
+            **self._history_fields(count, if_revision, request_id), validate_only=validate_only
+        )
+        return history_from_proto(self._caller.unary(self._edits.UndoEdits, request, timeout, repeatable=True))
+
+    def redo(
+        self,
+        count: int = 1,
+        *,
+        if_revision: int | None = None,
+        request_id: str | None = None,
+        validate_only: bool = False,
+        timeout: float | None = None,
+    ) -> HistoryResult:
+        """Does again the `count` batches that `undo` took back last, as one new revision.
+
+        A new batch ends it. Parameters as in `undo`; `FailedPreconditionError` NOTHING_TO_REDO.
+        """
+        request = edits_pb2.RedoEditsRequest(
+            **self._history_fields(count, if_revision, request_id), validate_only=validate_only
+        )
+        return history_from_proto(self._caller.unary(self._edits.RedoEdits, request, timeout, repeatable=True))
+
+    def _history_fields(self, count: int, if_revision: int | None, request_id: str | None) -> dict[str, Any]:
+        return {
+            "session": self.name,
+            "count": _count(count),
+            "if_revision": None if if_revision is None else as_int64(if_revision, "if_revision"),
+            "request_id": request_id or _new_request_id(),
+        }
+
     # ---- Following ----
 
     def mirror(
@@ -366,6 +438,24 @@ class Session(SessionChecks):
 
 def _new_request_id() -> str:
     return uuid.uuid4().hex
+
+
+def _conflict_policy(name: str) -> int:
+    if name in _CONFLICT_POLICIES:
+        return _CONFLICT_POLICIES[name]
+    raise InvalidArgumentError(
+        f'conflict_policy is "ignore" or "touched", not {name!r}',
+        reason="BAD_ARGUMENT",
+        metadata={"field": "conflict_policy"},
+    )
+
+
+def _count(value: int) -> int:
+    if 1 <= as_int64(value, "count") < 2**32:
+        return int(value)
+    raise InvalidArgumentError(
+        f"count is at least 1, not {value}", reason="BAD_ARGUMENT", metadata={"field": "count"}
+    )
 
 
 def _int32(value: int, what: str) -> int:

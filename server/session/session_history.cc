@@ -1,0 +1,87 @@
+// Session::MoveInHistory: undoing and redoing batches.
+
+#include <memory>
+#include <utility>
+
+#include "core/edit/restore_batches.h"
+#include "core/mesh/error.h"
+#include "server/session/fingerprint.h"
+#include "server/session/session.h"
+
+namespace dynmesh {
+namespace {
+
+uint64_t FingerprintOf(HistoryMove move, const HistoryOptions& options) {
+  Fingerprint fingerprint;
+  fingerprint.AddNumber(static_cast<uint64_t>(move));
+  fingerprint.AddNumber(options.count);
+  fingerprint.AddNumber(options.if_revision.has_value());
+  fingerprint.AddNumber(options.if_revision.value_or(0));
+  return fingerprint.value();
+}
+
+/// Lets batches be restored as long as somebody waits for them.
+class StopMeter final : public WorkMeter {
+ public:
+  explicit StopMeter(const StopSignal& stop) : stop_(stop) {}
+
+  absl::Status ChargeSteps(uint64_t) override { return stop_.Check(); }
+  absl::Status ChargeBytes(uint64_t) override { return absl::OkStatus(); }
+
+ private:
+  const StopSignal& stop_;
+};
+
+}  // namespace
+
+absl::StatusOr<Session::HistoryAnswerPtr> Session::MoveInHistory(HistoryMove move,
+                                                                 const HistoryOptions& options,
+                                                                 const StopSignal& stop) {
+  DYNMESH_RETURN_IF_ERROR(CheckRequestId(options.request_id));
+  const int64_t revision_before = revision();
+  absl::StatusOr<HistoryAnswerPtr> answer;
+  {
+    WriterMutexLock lock(&mu_);
+    DYNMESH_RETURN_IF_ERROR(gone_);
+    const bool once = !options.request_id.empty() && !options.validate_only;
+    answer = once ? MoveOnce(move, options, stop) : MoveLocked(move, options, stop);
+  }
+  if (revision() != revision_before) followers_.Wake();
+  return answer;
+}
+
+absl::StatusOr<Session::HistoryAnswerPtr> Session::MoveOnce(HistoryMove move, const HistoryOptions& options,
+                                                            const StopSignal& stop) {
+  const uint64_t fingerprint = FingerprintOf(move, options);
+  DYNMESH_ASSIGN_OR_RETURN(HistoryAnswerPtr remembered,
+                           history_answers_.Find(options.request_id, fingerprint));
+  if (remembered != nullptr) return remembered;
+  DYNMESH_ASSIGN_OR_RETURN(HistoryAnswerPtr answer, MoveLocked(move, options, stop));
+  history_answers_.Remember(options.request_id, fingerprint, answer, sizeof(HistoryResult));
+  return answer;
+}
+
+absl::StatusOr<Session::HistoryAnswerPtr> Session::MoveLocked(HistoryMove move, const HistoryOptions& options,
+                                                              const StopSignal& stop) {
+  DYNMESH_RETURN_IF_ERROR(CheckRevision(options.if_revision));
+  DYNMESH_ASSIGN_OR_RETURN(const std::vector<const BatchImage*> images, history_.Last(move, options.count));
+  StopMeter meter(stop);
+  absl::StatusOr<RestoredBatches> restored;
+  const absl::Status edited = RunEdit([&] {
+    restored = RestoreBatches(
+        mesh_, images,
+        {.dry_run = options.validate_only, .meter = meter, .max_image_bytes = history_.max_bytes()});
+    return restored.status();
+  });
+  if (!edited.ok()) return edited;
+  HistoryResult result = {restored->revision, options.count, restored->checksum, restored->counts};
+  if (!options.validate_only) {
+    history_.Moved(move, options.count, std::move(restored->images), mesh_.revision());
+    Committed();
+  }
+  result.undoable_batches = history_.size(HistoryMove::kUndo);
+  result.redoable_batches = history_.size(HistoryMove::kRedo);
+  return std::make_shared<const HistoryResult>(result);
+}
+
+}  // namespace dynmesh
