@@ -6,6 +6,7 @@
 #include "core/edit/restore_batches.h"
 #include "core/mesh/error.h"
 #include "server/session/fingerprint.h"
+#include "server/session/mesh_meter.h"
 #include "server/session/session.h"
 
 namespace dynmesh {
@@ -19,18 +20,6 @@ uint64_t FingerprintOf(HistoryMove move, const HistoryOptions& options) {
   fingerprint.AddNumber(options.if_revision.value_or(0));
   return fingerprint.value();
 }
-
-/// Lets batches be restored as long as somebody waits for them.
-class StopMeter final : public WorkMeter {
- public:
-  explicit StopMeter(const StopSignal& stop) : stop_(stop) {}
-
-  absl::Status ChargeSteps(uint64_t) override { return stop_.Check(); }
-  absl::Status ChargeBytes(uint64_t) override { return absl::OkStatus(); }
-
- private:
-  const StopSignal& stop_;
-};
 
 }  // namespace
 
@@ -65,7 +54,7 @@ absl::StatusOr<Session::HistoryAnswerPtr> Session::MoveLocked(HistoryMove move, 
                                                               const StopSignal& stop) {
   DYNMESH_RETURN_IF_ERROR(CheckRevision(options.if_revision));
   DYNMESH_ASSIGN_OR_RETURN(const std::vector<const BatchImage*> images, history_.Last(move, options.count));
-  StopMeter meter(stop);
+  MeshMeter meter({.used_bytes = 0, .max_bytes = limits().max_session_bytes}, stop);
   absl::StatusOr<RestoredBatches> restored;
   const absl::Status edited = RunEdit([&] {
     restored = RestoreBatches(

@@ -182,6 +182,25 @@ TEST_F(HistoryTest, AnImportCannotBeUndone) {
   ExpectRefused(*session, kUndo, {}, NoUndo());
 }
 
+TEST_F(HistoryTest, EditsThatAreNoListOfEditsAreUndoneToo) {
+  const SessionPtr session = daemon_.NewSession();
+  MustApply(*session, AddTet());
+  const auto edit = [&](BatchEnding ending) {
+    return session->EditMesh(
+        [ending](Mesh& mesh) -> absl::StatusOr<BatchEnding> {
+          DYNMESH_RETURN_IF_ERROR(mesh.RemoveElement(CellId(0)));
+          return ending;
+        },
+        [](const Mesh&) {});
+  };
+  ASSERT_TRUE(edit(BatchEnding::kRollBack).ok());
+  EXPECT_EQ(session->Info()->undoable_batches, 1u);
+  ASSERT_TRUE(edit(BatchEnding::kCommit).ok());
+  EXPECT_EQ(session->Info()->undoable_batches, 2u);
+  EXPECT_EQ(Must(*session, kUndo).counts[3], 1u);
+  EXPECT_EQ(Must(*session, kUndo).counts[0], 0u);
+}
+
 class StopAtOnce : public StopSignal {
  public:
   absl::Status Check() const override { return absl::CancelledError("nobody waits"); }

@@ -355,7 +355,7 @@ class Session(SessionChecks):
 
         Ids, positions and attributes are as before the batches; columns that they added stay, without their rows.
         `SessionInfo.undoable_batches` says how many there are: 100 unless the server is told otherwise, fewer when
-        they are large. An import cannot be undone.
+        they are large. A repair is a batch, too; an import cannot be undone.
 
         Parameters
         ----------
