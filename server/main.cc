@@ -71,6 +71,8 @@ ABSL_FLAG(uint64_t, max_answer_bytes, dynmesh::Limits().max_answer_bytes,
           "All answers of queries and exports that wait to be read");
 ABSL_FLAG(uint32_t, max_followers, dynmesh::Limits().max_followers, "Subscriptions of a session");
 ABSL_FLAG(uint32_t, max_concurrent_imports, dynmesh::Limits().max_concurrent_imports, "Imports at once");
+ABSL_FLAG(uint32_t, max_concurrent_adaptations, dynmesh::Limits().max_concurrent_adaptations,
+          "AdaptSession calls at once");
 ABSL_FLAG(uint64_t, max_staged_bytes, dynmesh::Limits().max_staged_bytes,
           "What imports have received and not built yet, all together");
 ABSL_FLAG(absl::Duration, import_idle_timeout, dynmesh::Limits().import_idle_timeout,
@@ -137,6 +139,7 @@ Limits LimitsFromFlags() {
   limits.max_query_steps = absl::GetFlag(FLAGS_max_query_steps);
   limits.max_answer_bytes = absl::GetFlag(FLAGS_max_answer_bytes);
   limits.max_followers = absl::GetFlag(FLAGS_max_followers);
+  limits.max_concurrent_adaptations = absl::GetFlag(FLAGS_max_concurrent_adaptations);
   limits.max_concurrent_imports = absl::GetFlag(FLAGS_max_concurrent_imports);
   limits.max_staged_bytes = absl::GetFlag(FLAGS_max_staged_bytes);
   limits.import_idle_timeout = absl::GetFlag(FLAGS_import_idle_timeout);

@@ -20,6 +20,7 @@
 #include "grpcpp/impl/service_type.h"
 #include "grpcpp/server.h"
 #include "grpcpp/server_builder.h"
+#include "server/rpc/adapt_service.h"
 #include "server/rpc/checks_service.h"
 #include "server/rpc/edits_service.h"
 #include "server/rpc/open_streams.h"
@@ -34,8 +35,8 @@ namespace dynmesh {
 namespace {
 
 constexpr const char* kServiceNames[] = {"dynmesh.v1.SessionService", "dynmesh.v1.EditService",
-                                         "dynmesh.v1.QueryService", "dynmesh.v1.CheckService",
-                                         "dynmesh.v1.RepairService",
+                                         "dynmesh.v1.QueryService",   "dynmesh.v1.CheckService",
+                                         "dynmesh.v1.RepairService",  "dynmesh.v1.AdaptService",
                                          "dynmesh.v1.SubscriptionService"};
 // gRPC refuses larger messages before we see them; up to there our own refusal names the limit.
 constexpr uint64_t kHardMessageFactor = 4;
@@ -137,6 +138,7 @@ class Server::Impl {
     services_.push_back(MakeRepairsService(context));
     services_.push_back(MakeChecksService(context));
     services_.push_back(MakeSubscriptionsService(context));
+    services_.push_back(MakeAdaptService(context));
   }
 
   ~Impl() {

@@ -21,6 +21,9 @@ struct ItemCounter {
   uint64_t operator()(const SplitElementsEdit& e) const { return e.elements.size(); }
   uint64_t operator()(const MergeVerticesEdit& e) const { return e.pairs.size() / 2; }
   uint64_t operator()(const DissolveVerticesEdit& e) const { return e.vertices.size(); }
+  uint64_t operator()(const SmoothVerticesEdit& e) const {
+    return e.vertices.size() * uint64_t{e.iterations};
+  }
 };
 
 }  // namespace

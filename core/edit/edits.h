@@ -7,6 +7,7 @@
 
 #include "core/edit/check_patch.h"
 #include "core/edit/patch.h"
+#include "core/edit/smooth.h"
 #include "core/mesh/mesh.h"
 
 namespace dynmesh {
@@ -87,17 +88,29 @@ struct DissolveVerticesEdit {
   PatchLimits limits;
 };
 
+/// Moves vertices as smooth.h says: all of them in their order, so many times. Who is gone after the first
+/// time is passed over.
+struct SmoothVerticesEdit {
+  std::vector<Slot> vertices = {};
+  SmoothRule rule = {};
+  uint32_t iterations = 1;  ///< 1 to kMaxSmoothIterations
+  PatchLimits limits = {};
+};
+inline constexpr uint32_t kMaxSmoothIterations = 1000;
+
 using Edit =
     std::variant<AddVerticesEdit, RemoveVerticesEdit, MoveVerticesEdit, AddElementsEdit, RemoveElementsEdit,
                  AddAttributeEdit, SetAttributeEdit, SplitEdgesEdit, CollapseEdgesEdit, SwapEdgesEdit,
-                 SwapFacesEdit, SplitElementsEdit, MergeVerticesEdit, DissolveVerticesEdit>;
+                 SwapFacesEdit, SplitElementsEdit, MergeVerticesEdit, DissolveVerticesEdit,
+                 SmoothVerticesEdit>;
 
-/// Whether it splits, collapses, swaps, merges or dissolves.
+/// Whether it splits, collapses, swaps, merges, dissolves or smooths.
 inline bool IsOperator(const Edit& edit) {
   return std::holds_alternative<SplitEdgesEdit>(edit) || std::holds_alternative<CollapseEdgesEdit>(edit) ||
          std::holds_alternative<SwapEdgesEdit>(edit) || std::holds_alternative<SwapFacesEdit>(edit) ||
          std::holds_alternative<SplitElementsEdit>(edit) || std::holds_alternative<MergeVerticesEdit>(edit) ||
-         std::holds_alternative<DissolveVerticesEdit>(edit);
+         std::holds_alternative<DissolveVerticesEdit>(edit) ||
+         std::holds_alternative<SmoothVerticesEdit>(edit);
 }
 
 /// How many vertices, elements, rows, or places for an operator an edit names.

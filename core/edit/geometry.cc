@@ -181,14 +181,20 @@ double SmallestDihedralAngle(absl::Span<const Point> p) {
     const auto& v = shape.faces[i].vertices;
     normals[i] = Cross(p[v[1]] - p[v[0]], p[v[2]] - p[v[0]]);
   }
-  double smallest = std::numeric_limits<double>::infinity();
+  // Which angle is smallest the cosines tell, which are cheap; how small, only the arc tangent tells exactly.
+  double largest = -std::numeric_limits<double>::infinity();
+  int first = 0, second = 1;
   for (int i = 0; i < 4; ++i) {
     for (int j = i + 1; j < 4; ++j) {
-      const double angle = std::atan2(Length(Cross(normals[i], normals[j])), -Dot(normals[i], normals[j]));
-      smallest = std::min(smallest, angle);
+      const double squares = Dot(normals[i], normals[i]) * Dot(normals[j], normals[j]);
+      const double cosine = squares > 0 ? -Dot(normals[i], normals[j]) / std::sqrt(squares) : 1;
+      if (cosine <= largest) continue;
+      largest = cosine;
+      first = i;
+      second = j;
     }
   }
-  return smallest;
+  return std::atan2(Length(Cross(normals[first], normals[second])), -Dot(normals[first], normals[second]));
 }
 
 }  // namespace dynmesh

@@ -1,5 +1,6 @@
 #include "core/edit/operator_runner.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -8,6 +9,7 @@
 #include "core/edit/merge.h"
 #include "core/edit/remove_vertex.h"
 #include "core/edit/run_batch.h"
+#include "core/edit/smooth.h"
 #include "core/edit/split.h"
 #include "core/edit/star.h"
 #include "core/edit/swap.h"
@@ -68,6 +70,19 @@ absl::Status CheckPlaces(const EdgesEdit& edit, absl::FunctionRef<bool(double)> 
                            {{"field", "parameters"}, {"index", absl::StrCat(i)}});
   }
   return CheckPositions(edit.positions, count);
+}
+
+absl::Status CheckSmoothing(const SmoothVerticesEdit& edit) {
+  if (!(edit.rule.factor > 0 && edit.rule.factor <= 1)) {
+    return InvalidArgument(reason::kBadArgument,
+                           absl::StrCat("a factor is above 0 and at most 1, not ", edit.rule.factor),
+                           {{"field", "factor"}});
+  }
+  if (edit.iterations >= 1 && edit.iterations <= kMaxSmoothIterations) return absl::OkStatus();
+  return InvalidArgument(
+      reason::kBadArgument,
+      absl::StrCat("there are 1 to ", kMaxSmoothIterations, " iterations, not ", edit.iterations),
+      {{"field", "iterations"}});
 }
 
 absl::optional<Point> PositionAt(absl::Span<const Point> positions, size_t i) {
@@ -144,6 +159,24 @@ absl::Status OperatorRunner::Run(const DissolveVerticesEdit& edit) {
     DYNMESH_ASSIGN_OR_RETURN(const VertexId v, names_.LiveVertex(edit.vertices[i]));
     return PlanRemoveVertex(mesh_, v, patch_);
   });
+}
+
+absl::Status OperatorRunner::Run(const SmoothVerticesEdit& edit) {
+  DYNMESH_RETURN_IF_ERROR(CheckSmoothing(edit));
+  std::vector<bool> moved(edit.vertices.size());
+  for (uint32_t iteration = 0; iteration < edit.iterations; ++iteration) {
+    const auto plan = [&](size_t i) -> absl::Status {
+      const absl::StatusOr<VertexId> v = names_.LiveVertex(edit.vertices[i]);
+      if (!v.ok()) return iteration == 0 ? v.status() : absl::OkStatus();
+      const absl::Status planned = PlanSmoothVertex(mesh_, *v, edit.rule, edit.limits, patch_);
+      if (!planned.ok()) return iteration == 0 ? planned : absl::OkStatus();
+      if (!patch_.moves.empty()) moved[i] = true;
+      return absl::OkStatus();
+    };
+    DYNMESH_RETURN_IF_ERROR(RunAll({edit.vertices.size(), 0}, edit.limits, plan));
+  }
+  result_.results.back().num_moved = std::count(moved.begin(), moved.end(), true);
+  return absl::OkStatus();
 }
 
 absl::Status OperatorRunner::RunAll(const Items& items, const PatchLimits& limits, Plan plan) {

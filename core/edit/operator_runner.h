@@ -37,6 +37,7 @@ class OperatorRunner {
   absl::Status Run(const SplitElementsEdit& edit);
   absl::Status Run(const MergeVerticesEdit& edit);
   absl::Status Run(const DissolveVerticesEdit& edit);
+  absl::Status Run(const SmoothVerticesEdit& edit);
 
  private:
   /// Items of an operator, and the vertices that each is known to add, which later edits can name.

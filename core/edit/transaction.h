@@ -40,6 +40,7 @@ struct EditResult {
   std::vector<Lineage> lineage;   ///< of operators, with BatchOptions::max_lineage
   std::vector<uint32_t> skipped;  ///< items that were refused, with BatchOptions::skip_refused
   std::vector<Refusal> refusals;  ///< of the first kMaxRefusals of the batch
+  uint32_t num_moved = 0;         ///< of the vertices that were to be smoothed
 };
 
 /// What a batch did or, for a dry run, would have done.

@@ -128,6 +128,32 @@ absl::StatusOr<Edit> ToEdit(const v1::DissolveVertices& message) {
   return edit;
 }
 
+absl::StatusOr<SmoothMethod> ToSmoothMethod(int method) {
+  switch (method) {
+    case v1::SMOOTH_METHOD_LAPLACIAN:
+      return SmoothMethod::kLaplacian;
+    case v1::SMOOTH_METHOD_UNSPECIFIED:
+    case v1::SMOOTH_METHOD_GUARDED:
+      return SmoothMethod::kGuarded;
+    case v1::SMOOTH_METHOD_OPTIMIZING:
+      return SmoothMethod::kOptimizing;
+    default:
+      return BadField("method", "this server does not know that method of smoothing");
+  }
+}
+
+absl::StatusOr<Edit> ToEdit(const v1::SmoothVertices& message) {
+  SmoothVerticesEdit edit;
+  DYNMESH_ASSIGN_OR_RETURN(edit.vertices, ToArray<Slot>(message.ids(), "ids"));
+  DYNMESH_ASSIGN_OR_RETURN(edit.rule.method, ToSmoothMethod(message.method()));
+  if (message.factor() != 0) edit.rule.factor = message.factor();
+  edit.rule.move_boundary = message.move_boundary();
+  edit.rule.tangential = message.tangential();
+  if (message.iterations() != 0) edit.iterations = message.iterations();
+  edit.limits = ToPatchLimits(message.limits());
+  return edit;
+}
+
 absl::StatusOr<Edit> ToEdit(const v1::Edit& message) {
   switch (message.kind_case()) {
     case v1::Edit::kAddVertices:
@@ -158,6 +184,8 @@ absl::StatusOr<Edit> ToEdit(const v1::Edit& message) {
       return ToEdit(message.merge_vertices());
     case v1::Edit::kDissolveVertices:
       return ToEdit(message.dissolve_vertices());
+    case v1::Edit::kSmoothVertices:
+      return ToEdit(message.smooth_vertices());
     case v1::Edit::KIND_NOT_SET:
       break;
   }
@@ -186,6 +214,7 @@ void FromEditResult(const EditResult& result, v1::EditResult* message) {
     FromError(refusal.status, item->mutable_error());
   }
   FromLineage(result.lineage, message);
+  message->set_num_moved(result.num_moved);
 }
 
 KindCounts ToKindCounts(const std::array<uint32_t, kNumEntityKinds>& live) {

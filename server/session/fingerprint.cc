@@ -58,6 +58,16 @@ struct EditVisitor {
     Add(edit.limits);
   }
 
+  void operator()(const SmoothVerticesEdit& edit) {
+    fingerprint.AddArray(edit.vertices);
+    fingerprint.AddNumber(static_cast<uint64_t>(edit.rule.method));
+    fingerprint.AddNumber(std::bit_cast<uint64_t>(edit.rule.factor));
+    fingerprint.AddNumber(edit.rule.move_boundary);
+    fingerprint.AddNumber(edit.rule.tangential);
+    fingerprint.AddNumber(edit.iterations);
+    Add(edit.limits);
+  }
+
   template <typename EdgesEdit>
   void AddPlaced(const EdgesEdit& edit) {
     Add(edit.edges);

@@ -42,6 +42,8 @@ struct Limits {
   uint32_t max_followers = 1000;
   /// Imports that are receiving or building.
   uint32_t max_concurrent_imports = 4;
+  /// AdaptSession calls that are under way: each remembers what there is to do, up to 20 bytes an edge.
+  uint32_t max_concurrent_adaptations = 4;
   /// What imports have received and not built yet, all together.
   uint64_t max_staged_bytes = DefaultMaxSessionBytes();
   /// How long an import may send nothing, or leave unread what it is told.

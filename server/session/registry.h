@@ -30,7 +30,9 @@ class SessionRegistry {
       : limits_(limits),
         workers_(workers),
         import_gate_(limits),
-        answer_budget_(std::make_shared<Budget>("max_answer_bytes", limits.max_answer_bytes)) {}
+        answer_budget_(std::make_shared<Budget>("max_answer_bytes", limits.max_answer_bytes)),
+        adaptation_budget_(
+            std::make_shared<Budget>("max_concurrent_adaptations", limits.max_concurrent_adaptations)) {}
 
   /// Makes an empty session. The same request_id with the same name and settings: what the first call gave.
   /// Errors: INVALID_ARGUMENT BAD_SESSION_NAME, REQUEST_ID_REUSED; ALREADY_EXISTS SESSION_EXISTS;
@@ -56,6 +58,8 @@ class SessionRegistry {
   ImportGate& import_gate() { return import_gate_; }
   /// Of answers that are gathered and wait to be read (max_answer_bytes).
   const std::shared_ptr<Budget>& answer_budget() const { return answer_budget_; }
+  /// Of adaptations that are under way: one each.
+  const std::shared_ptr<Budget>& adaptation_budget() const { return adaptation_budget_; }
   const Limits& limits() const { return limits_; }
   const Workers& workers() const { return workers_; }
 
@@ -67,6 +71,7 @@ class SessionRegistry {
   const Workers workers_;
   ImportGate import_gate_;
   const std::shared_ptr<Budget> answer_budget_;
+  const std::shared_ptr<Budget> adaptation_budget_;
   mutable Mutex mu_;
   std::map<std::string, SessionPtr, std::less<>> sessions_ ABSL_GUARDED_BY(mu_);
   AnswerMemory<SessionInfo> created_ ABSL_GUARDED_BY(mu_);

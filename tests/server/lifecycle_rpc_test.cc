@@ -97,8 +97,8 @@ TEST_F(LifecycleTest, ReflectionListsTheServices) {
     text.append(reinterpret_cast<const char*>(slice.begin()), slice.size());
   for (const char* service :
        {"dynmesh.v1.SessionService", "dynmesh.v1.EditService", "dynmesh.v1.QueryService",
-        "dynmesh.v1.CheckService", "dynmesh.v1.RepairService", "dynmesh.v1.SubscriptionService",
-        "grpc.health.v1.Health"}) {
+        "dynmesh.v1.CheckService", "dynmesh.v1.RepairService", "dynmesh.v1.AdaptService",
+        "dynmesh.v1.SubscriptionService", "grpc.health.v1.Health"}) {
     EXPECT_TRUE(absl::StrContains(text, service)) << service;
   }
   context.TryCancel();

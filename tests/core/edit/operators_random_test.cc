@@ -35,7 +35,7 @@ class Dice {
 
   Edit AnyOperator() {
     const bool crowded = NumElements() > kMaxElements;
-    switch (crowded ? 1 + Uniform(2) : Uniform(7)) {
+    switch (crowded ? 1 + Uniform(2) : Uniform(8)) {
       case 0:
         return SplitEdgesEdit{AnyEdges(), Parameters(0.1, 0.8), {}, AnyLimits()};
       case 1:
@@ -51,6 +51,12 @@ class Dice {
       }
       case 5:
         return DissolveVerticesEdit{{Any(EntityKind::kVertex)}, AnyLimits()};
+      case 6: {
+        const SmoothRule rule{.method = static_cast<SmoothMethod>(Uniform(3)),
+                              .move_boundary = Uniform(2) == 0,
+                              .tangential = Uniform(2) == 0};
+        return SmoothVerticesEdit{{Any(EntityKind::kVertex), Any(EntityKind::kVertex)}, rule, 2, AnyLimits()};
+      }
       default: {
         const Slot kept = Any(EntityKind::kVertex);  // with itself would be the caller's mistake
         return MergeVerticesEdit{{kept, kept + 1 + Uniform(5)}, {}, AnyLimits()};

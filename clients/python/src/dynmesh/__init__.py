@@ -11,6 +11,7 @@
 ...         mirror.wait(tx.result.revision)
 """
 
+from .adapt import AdaptProgress, AdaptResult, MeshShape
 from .checks import (
     CHECKS,
     CheckReport,
@@ -65,6 +66,8 @@ __version__ = "0.1.0"
 __all__ = [
     "CHECKS",
     "AbortedError",
+    "AdaptProgress",
+    "AdaptResult",
     "AlreadyExistsError",
     "Attribute",
     "AttributeSpec",
@@ -100,6 +103,7 @@ __all__ = [
     "LaunchError",
     "Lineage",
     "Located",
+    "MeshShape",
     "MeshTopology",
     "MeshWarning",
     "Mirror",

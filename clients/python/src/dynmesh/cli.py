@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from .cli_adapt import adapt, add_adapt
 from .cli_check import add_check, describe_report, run_check
 from .cli_query import add_questions
 from .cli_repair import add_repair_options, describe_repair, repair, repair_record
@@ -108,6 +109,7 @@ def _add_writing(commands: Any) -> None:
     fill.add_argument("name", metavar="NAME")
     fill.add_argument("file", metavar="FILE", help="any format that meshio reads")
     _add_import_options(fill)
+    add_adapt(lambda name, text: _command(commands, name, _adapt, text))
     store = _command(
         commands,
         "store",
@@ -252,6 +254,12 @@ def _undo(args: argparse.Namespace) -> None:
 def _redo(args: argparse.Namespace) -> None:
     with _client(args) as client:
         _print_history(args, "redid", client.session(args.name).redo(args.count))
+
+
+def _adapt(args: argparse.Namespace) -> None:
+    with _client(args) as client:
+        record, text = adapt(client.session(args.name), args)
+    _print(args, record, text)
 
 
 def _export(args: argparse.Namespace) -> None:

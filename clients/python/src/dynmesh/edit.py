@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, DTypeLike
 
 from .arrays import (
     Ids,
+    as_count,
     as_id_rows,
     as_ids,
     as_number,
@@ -303,6 +304,54 @@ class EditBatch:
         )
         return self._append(dissolve_vertices=message)
 
+    def smooth_vertices(
+        self,
+        vertices: ArrayLike,
+        *,
+        method: str = "guarded",
+        factor: float = 1.0,
+        iterations: int = 1,
+        move_boundary: bool = False,
+        tangential: bool = False,
+        allow_inversion: bool = False,
+        min_quality: float = 0.0,
+    ) -> int:
+        """Moves vertices to where the elements at them are better; returns the edit's index.
+
+        A move that the limits or the method do not permit is halved, up to four times; then the vertex stays.
+        ``tx.result.num_moved[index]`` says how many moved.
+
+        Parameters
+        ----------
+        vertices : uint32[n]
+            Ids or handles of this batch, moved in this order.
+        method : {"guarded", "laplacian", "optimizing"}
+            Towards the mean of the adjacent vertices unless the least quality of an element there would get worse;
+            towards it in any case; or uphill in that least quality, by small steps.
+        factor : float
+            Of the way to the mean that is tried first, above 0 and at most 1. Of "optimizing": of the first step, a
+            quarter of the mean length of the vertex's edges.
+        iterations : int
+            How often all are gone through, 1 to 1000.
+        move_boundary : bool
+            Vertices on the boundary move too, towards their neighbours along it.
+        tangential : bool
+            Vertices of surfaces and of the boundary stay in the plane across their mean normal, and those of the
+            boundary of a surface on the line between their neighbours.
+        allow_inversion, min_quality
+            As of `split_edges`.
+        """
+        message = edits_pb2.SmoothVertices(
+            ids=u32_bytes(as_ids(self._wire(vertices))),
+            method=_smooth_method(method),
+            factor=as_number(factor, "factor"),
+            iterations=as_count(iterations, "iterations"),
+            move_boundary=bool(move_boundary),
+            tangential=bool(tangential),
+            limits=_limits(allow_inversion, min_quality),
+        )
+        return self._append(smooth_vertices=message)
+
     def edits(self) -> list[edits_pb2.Edit]:
         """The edits so far, as messages."""
         return list(self._edits)
@@ -321,6 +370,7 @@ class EditBatch:
             skipped=tuple(from_bytes(result.skipped, "<u4") for result in reply.results),
             refusals=tuple(tuple(map(refusal_from_proto, result.refusals)) for result in reply.results),
             lineage=tuple(map(lineage_from_proto, reply.results)),
+            num_moved=tuple(result.num_moved for result in reply.results),
         )
 
     def _append_vertices(self, count: int, **kind: Any) -> Ids:
@@ -399,6 +449,13 @@ class Transaction(EditBatch):
 def _limits(allow_inversion: bool, min_quality: float) -> edits_pb2.OperatorLimits:
     quality = as_number(min_quality, "min_quality")
     return edits_pb2.OperatorLimits(allow_inversion=bool(allow_inversion), min_quality=quality)
+
+
+def _smooth_method(name: str) -> int:
+    methods = {"laplacian", "guarded", "optimizing"}
+    if name not in methods:
+        raise InvalidArgumentError(f"method {name!r} is none of {sorted(methods)}", reason="BAD_ARGUMENT")
+    return edits_pb2.SmoothMethod.Value(f"SMOOTH_METHOD_{name.upper()}")
 
 
 def _places(parameters: ArrayLike | None, positions: ArrayLike | None, count: int) -> dict[str, bytes]:

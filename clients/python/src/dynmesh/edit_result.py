@@ -75,6 +75,8 @@ class EditResult:
         For each edit why: of the first 100 of the batch.
     lineage : tuple of Lineage
         For each edit which elements it made of which, with ``report_lineage``.
+    num_moved : tuple of int
+        For each edit how many vertices `smooth_vertices` moved.
     batch_number : int
         Tells the batch's handles from those of others.
     """
@@ -89,6 +91,7 @@ class EditResult:
     skipped: tuple[Ids, ...] = ()
     refusals: tuple[tuple[Refusal, ...], ...] = ()
     lineage: tuple[Lineage, ...] = ()
+    num_moved: tuple[int, ...] = ()
 
     def resolve(self, vertices: ArrayLike) -> Ids:
         """Vertex ids for handles that `EditBatch.add_vertices` gave out; ids stay as they are.

@@ -11,6 +11,7 @@ from google.protobuf import field_mask_pb2
 from numpy.typing import ArrayLike
 
 from ._calls import Caller
+from .adapt import AdaptProgress, AdaptResult, adapt_request, read_adaptation
 from .arrays import as_int64
 from .delta import HAS_NATIVE
 from .edit import EditBatch, Transaction
@@ -29,6 +30,7 @@ from .session_checks import SessionChecks
 from .session_reader import FOREVER
 from .transfer import ImportResult, import_requests, read_import
 from .v1 import (
+    adapt_pb2_grpc,
     edits_pb2,
     edits_pb2_grpc,
     repairs_pb2,
@@ -66,6 +68,7 @@ class Session(SessionChecks):
 
     def __init__(self, name: str, channel: grpc.Channel, caller: Caller) -> None:
         super().__init__(name, channel, caller)
+        self._adapt = adapt_pb2_grpc.AdaptServiceStub(channel)
         self._edits = edits_pb2_grpc.EditServiceStub(channel)
         self._repairs = repairs_pb2_grpc.RepairServiceStub(channel)
         self._subscriptions = subscriptions_pb2_grpc.SubscriptionServiceStub(channel)
@@ -397,6 +400,61 @@ class Session(SessionChecks):
             "if_revision": None if if_revision is None else as_int64(if_revision, "if_revision"),
             "request_id": request_id or _new_request_id(),
         }
+
+    def adapt(
+        self,
+        target_length: float | None = None,
+        *,
+        size_attribute: str | None = None,
+        min_quality: float = 0.3,
+        feature_angle: float = 40.0,
+        max_passes: int = 10,
+        max_elements: int | None = None,
+        progress: bool | Callable[[AdaptProgress], None] | None = None,
+        timeout: float | None = None,
+    ) -> AdaptResult:
+        """Brings a mesh of triangles or of tetrahedra to a target edge length and quality.
+
+        By splits, collapses, swaps and moves, in passes. Kept are the topology, the orientation of elements, sharp
+        edges and corners with their places, and the form of surfaces up to half of `feature_angle`; and no angle
+        gets smaller than the smallest one at the start, or than 12 degrees. Each pass is a revision, or several:
+        others can edit in between, and mirrors follow. When this is interrupted, what was done until then stays.
+
+        Parameters
+        ----------
+        target_length : float
+            Of edges, in units of the positions. Edges from 4/5 to 4/3 of it are left alone.
+        size_attribute : str, optional
+            In its place: the vertex attribute (one float64 or float32) that holds it.
+        min_quality : float
+            Elements below it are worked on, 0 to 1 (regular): the smaller of the mean ratio and of the smallest
+            angle over that of the regular element.
+        feature_angle : float
+            Degrees: an edge of a surface whose faces deviate from one plane by more is kept.
+        max_passes : int
+        max_elements : int, optional
+            No more splits when there are so many.
+        progress : bool or callable, optional
+            Whether to show a bar (default: on a terminal); or what is called with each `AdaptProgress`.
+        timeout : float, optional
+            Default: none, as it takes as long as it takes.
+
+        Raises
+        ------
+        FailedPreconditionError
+            NOT_SIMPLEX or ELEMENT_IN_THE_WAY: ``error.ids`` are other elements.
+        InvalidArgumentError
+            ``metadata["field"]`` makes no sense.
+        """
+        request = adapt_request(
+            self.name, target_length, size_attribute, min_quality, feature_angle, max_passes, max_elements
+        )
+        listen = progress if callable(progress) else None
+        with Progress("adapting", False if callable(progress) else progress) as bar:
+            replies = self._caller.stream(
+                self._adapt.AdaptSession, request, FOREVER if timeout is None else timeout
+            )
+            return read_adaptation(replies, bar, listen)
 
     # ---- Following ----
 
