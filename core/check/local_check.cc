@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "core/check/incidence.h"
 #include "core/check/shape.h"
 #include "core/edit/geometry.h"
+#include "core/mesh/vector.h"
 
 namespace dynmesh {
 namespace {
@@ -13,7 +15,34 @@ namespace {
 using MaybeValue = absl::optional<double>;
 
 /// A geometric measure takes about as long as so many steps.
-constexpr uint64_t kStepsOfShape = 20;
+uint64_t StepsOfShape(CheckKind check, ElementType type) {
+  const bool dihedral = check == CheckKind::kMinDihedral || check == CheckKind::kMaxDihedral;
+  return (dihedral ? 15 : 5) * (2 + TemplateOf(type).num_edges);
+}
+
+double LargestOf(absl::Span<const Point> points) {
+  double largest = 0;
+  for (const Point& p : points) {
+    for (double x : p) largest = std::max(largest, std::abs(x));
+  }
+  return largest;
+}
+
+/// A power of two that brings `largest` near 1; multiplying by it rounds nothing.
+double ScaleOf(double largest) {
+  constexpr int kMostBits = 1020;
+  return std::ldexp(1.0, -std::clamp(largest > 0 ? std::ilogb(largest) : 0, -kMostBits, kMostBits));
+}
+
+/// Moves and scales a shape, which changes no measure, so that products of its lengths stay numbers.
+void Normalize(absl::Span<Point> points) {
+  const double smaller = ScaleOf(LargestOf(points)) / 2;  // differences, too, are numbers then
+  for (Point& p : points) p = smaller * p;
+  const Point origin = points[0];
+  for (Point& p : points) p = p - origin;
+  const double larger = ScaleOf(LargestOf(points));
+  for (Point& p : points) p = larger * p;
+}
 
 MaybeValue MeasureShape(CheckKind check, ElementType type, absl::Span<const Point> points) {
   switch (check) {
@@ -44,10 +73,11 @@ bool IsOfAllFaces(CheckKind check) {
 
 absl::StatusOr<MaybeValue> MeasureShape(const Mesh& mesh, CheckKind check, EntityId id, WorkMeter& meter) {
   if (!mesh.IsElement(id) && !IsOfAllFaces(check)) return MaybeValue();
-  DYNMESH_RETURN_IF_ERROR(meter.ChargeSteps(kStepsOfShape));
+  DYNMESH_RETURN_IF_ERROR(meter.ChargeSteps(StepsOfShape(check, mesh.Type(id))));
   const auto vertices = mesh.VerticesOf(id);
   std::array<Point, kMaxElementVertices> points;
   for (size_t k = 0; k < vertices.size(); ++k) points[k] = mesh.Position(vertices[k]);
+  Normalize(absl::MakeSpan(points.data(), vertices.size()));
   return MeasureShape(check, mesh.Type(id), absl::MakeConstSpan(points.data(), vertices.size()));
 }
 

@@ -93,41 +93,59 @@ absl::optional<Point> PositionAt(absl::Span<const Point> positions, size_t i) {
 
 absl::Status OperatorRunner::Run(const SplitEdgesEdit& edit) {
   DYNMESH_RETURN_IF_ERROR(CheckPlaces(edit, [](double t) { return t > 0 && t < 1; }));
-  return RunAll({edit.edges.size(), 1}, edit.limits, [&](size_t i) -> absl::Status {
-    DYNMESH_ASSIGN_OR_RETURN(const EdgeId e, names_.Edge(edit.edges, i));
-    SplitPlace place;
-    if (!edit.parameters.empty()) place.parameter = edit.parameters[i];
-    place.position = PositionAt(edit.positions, i);
-    place.origin = names_.OriginOf(edit.edges, i);
-    return PlanSplitEdge(mesh_, e, place, patch_);
-  });
+  return RunAll(
+      {edit.edges.size(), 1}, edit.limits,
+      [&](size_t i) -> absl::Status {
+        DYNMESH_ASSIGN_OR_RETURN(const EdgeId e, names_.Edge(edit.edges, i));
+        SplitPlace place;
+        if (!edit.parameters.empty()) place.parameter = edit.parameters[i];
+        place.position = PositionAt(edit.positions, i);
+        place.origin = names_.OriginOf(edit.edges, i);
+        return PlanSplitEdge(mesh_, e, place, patch_);
+      },
+      [&](size_t i, int stage) {
+        if (!edit.edges.ids.empty()) mesh_.PrefetchStar(EdgeId(edit.edges.ids[i]), stage);
+      });
 }
 
 absl::Status OperatorRunner::Run(const CollapseEdgesEdit& edit) {
   DYNMESH_RETURN_IF_ERROR(CheckPlaces(edit, [](double t) { return t >= 0 && t <= 1; }));
-  return RunAll({edit.edges.size(), 0}, edit.limits, [&](size_t i) -> absl::Status {
-    DYNMESH_ASSIGN_OR_RETURN(const EdgeId e, names_.Edge(edit.edges, i));
-    CollapsePlace place;
-    place.origin = names_.OriginOf(edit.edges, i);
-    place.parameter = edit.parameters.empty() ? DefaultParameter(e, place.origin) : edit.parameters[i];
-    place.position = PositionAt(edit.positions, i);
-    return PlanCollapseEdge(mesh_, e, place, patch_);
-  });
+  return RunAll(
+      {edit.edges.size(), 0}, edit.limits,
+      [&](size_t i) -> absl::Status {
+        DYNMESH_ASSIGN_OR_RETURN(const EdgeId e, names_.Edge(edit.edges, i));
+        CollapsePlace place;
+        place.origin = names_.OriginOf(edit.edges, i);
+        place.parameter = edit.parameters.empty() ? DefaultParameter(e, place.origin) : edit.parameters[i];
+        place.position = PositionAt(edit.positions, i);
+        return PlanCollapseEdge(mesh_, e, place, patch_);
+      },
+      [&](size_t i, int stage) {
+        if (!edit.edges.ids.empty()) PrefetchEnd(EdgeId(edit.edges.ids[i]), stage);
+      });
 }
 
 absl::Status OperatorRunner::Run(const SwapEdgesEdit& edit) {
   DYNMESH_RETURN_IF_ERROR(CheckNames(edit.edges));
-  return RunAll({edit.edges.size(), 0}, edit.limits, [&](size_t i) -> absl::Status {
-    DYNMESH_ASSIGN_OR_RETURN(const EdgeId e, names_.Edge(edit.edges, i));
-    return PlanSwapEdge(mesh_, e, patch_);
-  });
+  return RunAll(
+      {edit.edges.size(), 0}, edit.limits,
+      [&](size_t i) -> absl::Status {
+        DYNMESH_ASSIGN_OR_RETURN(const EdgeId e, names_.Edge(edit.edges, i));
+        return PlanSwapEdge(mesh_, e, patch_);
+      },
+      [&](size_t i, int stage) {
+        if (!edit.edges.ids.empty()) mesh_.PrefetchStar(EdgeId(edit.edges.ids[i]), stage);
+      });
 }
 
 absl::Status OperatorRunner::Run(const SwapFacesEdit& edit) {
-  return RunAll({edit.faces.size(), 0}, edit.limits, [&](size_t i) -> absl::Status {
-    DYNMESH_ASSIGN_OR_RETURN(const FaceId f, names_.Face(edit.faces[i]));
-    return PlanSwapFace(mesh_, f, patch_);
-  });
+  return RunAll(
+      {edit.faces.size(), 0}, edit.limits,
+      [&](size_t i) -> absl::Status {
+        DYNMESH_ASSIGN_OR_RETURN(const FaceId f, names_.Face(edit.faces[i]));
+        return PlanSwapFace(mesh_, f, patch_);
+      },
+      [&](size_t i, int stage) { mesh_.PrefetchStar(FaceId(edit.faces[i]), stage); });
 }
 
 absl::Status OperatorRunner::Run(const SplitElementsEdit& edit) {
@@ -179,9 +197,26 @@ absl::Status OperatorRunner::Run(const SmoothVerticesEdit& edit) {
   return absl::OkStatus();
 }
 
+/// A collapse needs the star of the vertex that goes: most often the second one.
+void OperatorRunner::PrefetchEnd(EdgeId e, int stage) const {
+  if (stage == 0) return mesh_.PrefetchStar(e, 0);
+  if (mesh_.IsLive(e)) mesh_.PrefetchStar(mesh_.Vertices(e)[1], stage - 1);
+}
+
 absl::Status OperatorRunner::RunAll(const Items& items, const PatchLimits& limits, Plan plan) {
+  return RunAll(items, limits, plan, [](size_t, int) {});
+}
+
+absl::Status OperatorRunner::RunAll(const Items& items, const PatchLimits& limits, Plan plan,
+                                    Prefetch prefetch) {
+  constexpr int kStages = Mesh::kPrefetchStages + 1;  // a collapse looks for the end first
+  constexpr int kItemsBetween = 2;                    // stages: an item takes far longer than memory
   DYNMESH_RETURN_IF_ERROR(CheckLimits(limits));
   for (size_t i = 0; i < items.count; ++i) {
+    for (int stage = 0; stage < kStages; ++stage) {
+      const size_t ahead = i + (kStages - stage) * kItemsBetween;
+      if (ahead < items.count) prefetch(ahead, stage);
+    }
     absl::Status status = conflicts_.Explain(RunOne(i, limits, plan));
     if (status.ok()) {
       DYNMESH_RETURN_IF_ERROR(Report(items));

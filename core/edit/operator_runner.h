@@ -47,7 +47,12 @@ class OperatorRunner {
   };
   using Plan = absl::FunctionRef<absl::Status(size_t)>;  ///< fills patch_ for an item
 
+  /// Asks memory for what an item will need (Mesh::PrefetchStar), some items before it is planned.
+  using Prefetch = absl::FunctionRef<void(size_t item, int stage)>;
+
   absl::Status RunAll(const Items& items, const PatchLimits& limits, Plan plan);
+  absl::Status RunAll(const Items& items, const PatchLimits& limits, Plan plan, Prefetch prefetch);
+  void PrefetchEnd(EdgeId e, int stage) const;
   absl::Status RunOne(size_t item, const PatchLimits& limits, Plan plan);
   absl::Status ApplyPlanned(uint64_t max_attribute_bytes);
   absl::Status ChargePlanned();

@@ -23,7 +23,8 @@ class RowWriter {
   /// Errors: those of Mesh::SetAttribute; RESOURCE_EXHAUSTED max_session_bytes beyond max_bytes.
   absl::Status Set(int column, Slot slot, absl::Span<const uint8_t> row) {
     if (mesh_.attributes()[column].Row(slot) == row) return absl::OkStatus();
-    bytes_ += kBytesOfRow + 2 * row.size();  // in the column and in the journal
+    bytes_ += kBytesOfRow + 2 * row.size();  // in the journal
+    bytes_ += mesh_.attributes()[column].BytesToSet({&slot, 1});
     if (bytes_ > max_bytes_) return LimitExceeded("max_session_bytes", max_bytes_, bytes_);
     return mesh_.SetAttribute(column, slot, row);
   }
@@ -32,7 +33,7 @@ class RowWriter {
   uint64_t bytes() const { return bytes_; }
 
  private:
-  static constexpr uint64_t kBytesOfRow = 32;  ///< its stamp and journal entry
+  static constexpr uint64_t kBytesOfRow = 32;  ///< its journal entry
 
   Mesh& mesh_;
   const uint64_t max_bytes_;

@@ -26,7 +26,8 @@ class BatchApplier {
       : mesh_(mesh),
         names_(mesh, std::min(options.as_of_revision, mesh.revision())),
         result_(result),
-        operators_(mesh, options, names_, result) {}
+        operators_(mesh, options, names_, result),
+        max_attribute_bytes_(options.max_attribute_bytes) {}
   BatchApplier(const BatchApplier&) = delete;  // the runner refers to the names
 
   absl::Status operator()(const AddVerticesEdit& edit) {
@@ -150,8 +151,16 @@ class BatchApplier {
     const size_t row_bytes = mesh_.attributes()[column].spec().row_bytes();
     return ForEach(slots.size(), [&](size_t i) -> absl::Status {
       DYNMESH_ASSIGN_OR_RETURN(const EntityId id, names_.Entity(kind, slots[i]));
+      DYNMESH_RETURN_IF_ERROR(ChargeRow(column, id.slot));
       return mesh_.SetAttribute(column, id.slot, rows.subspan(i * row_bytes, row_bytes));
     });
+  }
+
+  /// A row at a far slot takes a page, which is much more than what arrives.
+  absl::Status ChargeRow(int column, Slot slot) {
+    attribute_bytes_ += mesh_.attributes()[column].BytesToSet({&slot, 1});
+    if (attribute_bytes_ <= max_attribute_bytes_) return absl::OkStatus();
+    return LimitExceeded("max_session_bytes", max_attribute_bytes_, attribute_bytes_);
   }
 
   /// Hilbert order, or none when a position is not finite and so will be refused.
@@ -162,8 +171,8 @@ class BatchApplier {
 
   static absl::Status UnknownAttribute(const AttributeSpec& spec) {
     return MakeError(absl::StatusCode::kNotFound, reason::kUnknownAttribute,
-                     absl::StrCat("no ", EntityKindName(spec.kind), " attribute '", spec.name,
-                                  "' of ", spec.components, " components"),
+                     absl::StrCat("no ", EntityKindName(spec.kind), " attribute '", spec.name, "' of ",
+                                  spec.components, " components"),
                      {{"attribute", spec.name}});
   }
 
@@ -173,6 +182,8 @@ class BatchApplier {
   BatchNames names_;
   BatchResult& result_;
   OperatorRunner operators_;
+  const uint64_t max_attribute_bytes_;
+  uint64_t attribute_bytes_ = 0;  ///< of rows that were set
 };
 
 absl::Status ApplyAll(Mesh& mesh, absl::Span<const Edit> edits, const BatchOptions& options,

@@ -82,7 +82,7 @@ struct BatchOptions {
   /// RESOURCE_EXHAUSTED: one item may touch as many elements as the mesh has.
   uint64_t max_made = std::numeric_limits<uint64_t>::max();
   uint64_t max_work = std::numeric_limits<uint64_t>::max();
-  /// The same for bytes of attributes that new vertices and elements take.
+  /// The same for bytes of attributes: of rows that are set, and of those that operators make.
   uint64_t max_attribute_bytes = std::numeric_limits<uint64_t>::max();
   /// Looks at the mesh after the last edit, and may refuse the batch or add warnings. It may look at max_work
   /// entities, too. Null: nobody looks.

@@ -63,6 +63,7 @@ class TouchedGatherer {
         return absl::OkStatus();
       case JournalOp::kAddAttribute:
       case JournalOp::kSetAttribute:
+      case JournalOp::kRecycle:  // of what is restored; the new occupant is created next
         return absl::OkStatus();
       case JournalOp::kCreate:
       case JournalOp::kDestroy:

@@ -67,14 +67,17 @@ absl::Status CheckReactor::Check(const Session& session, AccessGrant& grant) {
 void CheckReactor::OnProgress(absl::string_view phase, uint64_t done, uint64_t total) {
   {
     MutexLock lock(&mu_);
-    if (writing_ || broken_) return;
-    writing_ = true;
+    if (writing_ || broken_) return;  // nobody else begins to write before all is checked
   }
   response_.set_revision(revision_);
   v1::CheckProgress* progress = response_.mutable_progress();
   progress->set_phase(std::string(phase));
   progress->set_done(done);
   progress->set_total(total);
+  {
+    MutexLock lock(&mu_);
+    writing_ = true;  // last: memory may have run out before
+  }
   StartWrite(&response_);
 }
 

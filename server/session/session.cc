@@ -66,30 +66,26 @@ bool Grows(const Edit& edit) {
          IsOperator(edit);
 }
 
-/// Bytes that the rows which `edits` set would add. A row at a far slot takes a page, so that is much more
-/// than what arrives.
+bool WritesRows(const Edit& edit) {
+  return std::holds_alternative<SetAttributeEdit>(edit) || IsOperator(edit);
+}
+
+/// Bytes that the rows which `edits` set would add where columns and entities are there already; what else
+/// they set is counted as it comes (BatchOptions::max_attribute_bytes).
 uint64_t AttributeGrowth(const Mesh& mesh, absl::Span<const Edit> edits) {
-  struct Rows {
-    const AttributeSpec* spec = nullptr;
-    std::vector<Slot> slots;
-  };
-  std::map<std::pair<EntityKind, std::string>, Rows> columns;
+  std::map<int, std::vector<Slot>> slots;  // by column
   for (const Edit& edit : edits) {
     const auto* set = std::get_if<SetAttributeEdit>(&edit);
     if (set == nullptr) continue;
-    Rows& rows = columns[{set->spec.kind, set->spec.name}];
-    rows.spec = &set->spec;
+    const int column = mesh.FindAttribute(set->spec.name, set->spec.kind);
+    if (column < 0) continue;
     const Slot limit = mesh.slots(set->spec.kind).limit();
     for (Slot slot : set->slots) {
-      if (slot < limit) rows.slots.push_back(slot);  // others are refused
+      if (slot < limit) slots[column].push_back(slot);
     }
   }
   uint64_t bytes = 0;
-  for (const auto& [key, rows] : columns) {
-    const int index = mesh.FindAttribute(key.second, key.first);
-    const AttributeColumn fresh(*rows.spec);
-    bytes += (index < 0 ? fresh : mesh.attributes()[index]).BytesToSet(rows.slots);
-  }
+  for (const auto& [column, rows] : slots) bytes += mesh.attributes()[column].BytesToSet(rows);
   return bytes;
 }
 
@@ -126,8 +122,8 @@ Session::Session(const Options& options)
       create_time_(absl::Now()),
       mesh_(MeshOptions{options.settings.duplicates, ToMeshLimits(options.limits)}),
       commit_time_(create_time_),
-      checks_(options.settings.checks),
       history_(options.limits),
+      checks_(options.settings.checks),
       spatial_(options.limits.max_session_bytes),
       followers_(options.limits.max_followers),
       deltas_(*this) {
@@ -204,7 +200,7 @@ absl::StatusOr<Session::AnswerPtr> Session::ApplyLocked(absl::Span<const Edit> e
   batch.make_image = history_.keeps_batches();
   batch.max_made = limits().max_batch_items;
   batch.max_work = kMaxBatchWork;
-  const uint64_t used = std::any_of(edits.begin(), edits.end(), IsOperator) ? mesh_.memory_bytes() : 0;
+  const uint64_t used = std::any_of(edits.begin(), edits.end(), WritesRows) ? mesh_.memory_bytes() : 0;
   batch.max_attribute_bytes = limits().max_session_bytes - std::min(used, limits().max_session_bytes);
   const CheckSettings settings = checks();
   NeighborhoodCheck checker(settings);

@@ -1,13 +1,12 @@
-// Edit operators at random places, one after the other in one batch: planned, checked and carried out, with
-// edges, faces, boundary, stamps and checksums kept current. `.../by_elements` does the same by removing
-// elements and adding others.
+// Edit operators at random places, as one batch: each planned, checked and carried out, with edges, faces,
+// boundary, stamps and checksums kept current. `.../by_elements` does the same by removing elements and
+// adding others.
 
 #include <benchmark/benchmark.h>
 
 #include <memory>
 
-#include "core/edit/apply_patch.h"
-#include "core/edit/check_patch.h"
+#include "core/edit/transaction.h"
 #include "tests/bench/digest.h"
 #include "tests/bench/operators.h"
 #include "tests/bench/tasks.h"
@@ -18,18 +17,13 @@ namespace {
 using Places = std::shared_ptr<const std::vector<Slot>>;
 
 void OperateAt(Mesh& mesh, const Operator& op, const std::vector<Slot>& places) {
-  dynmesh::Patch patch;
-  AppliedPatch applied;
-  for (Slot place : places) {
-    patch.Clear();
-    Must(op.plan(mesh, place, patch));
-    Must(CheckPatch(mesh, patch));
-    Must(ApplyPatch(mesh, patch, applied));
-  }
+  const Edit edit = op.edit(places);
+  Must(ApplyBatch(mesh, absl::MakeConstSpan(&edit, 1), {}).status());
 }
 
 /// As a client does who knows nothing but elements.
 void ReplaceByElements(Mesh& mesh, const std::vector<dynmesh::Patch>& patches) {
+  mesh.BeginBatch();
   std::vector<VertexId> made;
   for (const dynmesh::Patch& patch : patches) {
     made.clear();
@@ -43,6 +37,7 @@ void ReplaceByElements(Mesh& mesh, const std::vector<dynmesh::Patch>& patches) {
     }
     for (VertexId v : patch.removed_vertices) Must(mesh.RemoveVertex(v));
   }
+  Must(mesh.Commit());
 }
 
 /// A copy has no room to grow, and would move all its arrays in the first edit, which no other edit does.
@@ -50,6 +45,7 @@ void MakeRoom(ElementType type, Mesh& mesh) {
   std::vector<VertexId> vertices;
   for (int k = 0; k < NumVertices(type); ++k) vertices.push_back(Must(mesh.AddVertex({0, 0, 0})));
   Must(mesh.AddElement(type, vertices));
+  Must(mesh.Commit());
 }
 
 template <typename Task>
@@ -58,7 +54,6 @@ void Register(const std::string& name, const Fixture& fixture, size_t items, Tas
     for (auto _ : state) {
       state.PauseTiming();
       auto copy = std::make_unique<Mesh>(fixture.mesh.Clone());
-      copy->BeginBatch();
       MakeRoom(fixture.input.type, *copy);
       state.ResumeTiming();
       task(*copy);
@@ -77,9 +72,7 @@ void RegisterOperator(const Fixture& fixture, const Operator& op) {
   const auto patches = std::make_shared<std::vector<dynmesh::Patch>>(places->size());
   for (size_t i = 0; i < places->size(); ++i) Must(op.plan(mesh, (*places)[i], (*patches)[i]));
   Mesh operated = mesh.Clone(), replaced = mesh.Clone();
-  operated.BeginBatch();
   OperateAt(operated, op, *places);
-  replaced.BeginBatch();
   ReplaceByElements(replaced, *patches);
   for (EntityKind kind : kEntityKinds) {
     CheckSame(operated.NumLive(kind) == replaced.NumLive(kind), op.name.c_str(), "by_elements");

@@ -28,6 +28,31 @@ absl::Status SwapFace(const Mesh& mesh, Slot f, dynmesh::Patch& patch) {
   return PlanSwapFace(mesh, FaceId(f), patch);
 }
 
+Edit SplitAll(const std::vector<Slot>& edges) {
+  SplitEdgesEdit edit;
+  edit.edges.ids = edges;
+  return edit;
+}
+
+Edit CollapseAll(const std::vector<Slot>& edges) {
+  CollapseEdgesEdit edit;
+  edit.edges.ids = edges;
+  edit.parameters.assign(edges.size(), 0);
+  return edit;
+}
+
+Edit SwapAllEdges(const std::vector<Slot>& edges) {
+  SwapEdgesEdit edit;
+  edit.edges.ids = edges;
+  return edit;
+}
+
+Edit SwapAllFaces(const std::vector<Slot>& faces) {
+  SwapFacesEdit edit;
+  edit.faces = faces;
+  return edit;
+}
+
 /// Vertices of what a patch replaces, and their neighbours: nothing else decides whether it is accepted.
 class Claims {
  public:
@@ -59,12 +84,12 @@ class Claims {
 }  // namespace
 
 std::vector<Operator> OperatorsFor(ElementType type) {
-  std::vector<Operator> operators = {{"split", EntityKind::kEdge, Split},
-                                     {"collapse", EntityKind::kEdge, Collapse}};
+  std::vector<Operator> operators = {{"split", EntityKind::kEdge, Split, SplitAll},
+                                     {"collapse", EntityKind::kEdge, Collapse, CollapseAll}};
   if (type == ElementType::kTetrahedron || type == ElementType::kTriangle) {
-    operators.push_back({"swap_edge", EntityKind::kEdge, SwapEdge});
+    operators.push_back({"swap_edge", EntityKind::kEdge, SwapEdge, SwapAllEdges});
   }
-  if (type == ElementType::kTetrahedron) operators.push_back({"swap_face", EntityKind::kFace, SwapFace});
+  if (type == ElementType::kTetrahedron) operators.push_back({"swap_face", EntityKind::kFace, SwapFace, SwapAllFaces});
   return operators;
 }
 

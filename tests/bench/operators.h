@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "core/edit/edits.h"
 #include "core/edit/patch.h"
 #include "tests/bench/fixture.h"
 
@@ -15,6 +16,7 @@ struct Operator {
   std::string name;  ///< "split", "collapse", "swap_edge", "swap_face"
   EntityKind kind;
   absl::Status (*plan)(const Mesh& mesh, Slot slot, dynmesh::Patch& patch);
+  Edit (*edit)(const std::vector<Slot>& places);  ///< the same at many places, for a batch
 };
 
 /// Those that make sense for a mesh of elements of this type.

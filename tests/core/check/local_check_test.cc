@@ -176,22 +176,40 @@ TEST(LocalCheckTest, WhatCostsTooMuchIsNotGoneOnWith) {
   EXPECT_FALSE(MeasureEntity(mesh, CheckKind::kVertexLink, VertexId(0), meter).ok());
 }
 
-TEST(LocalCheckTest, CoordinatesAtTheEndsOfTheirRangeAreMeasuredOrBadButDoNoHarm) {
-  for (double size : {1e308, 1e155, 1e-160, 5e-324}) {
-    Mesh mesh = MakeMesh(4);
-    Add(mesh, ElementType::kTetrahedron, {0, 1, 2, 3});
-    for (Slot v = 0; v < 4; ++v) {
-      Point p = {-size, -size, -size};
-      if (v > 0) p[v - 1] = size;
-      ASSERT_TRUE(mesh.MoveVertex(VertexId(v), p).ok());
-    }
-    Commit(mesh);
+/// A sliver that is turned over, with edges of about `size`.
+Mesh Sliver(double size) {
+  Mesh mesh = MakeMesh(4);
+  Add(mesh, ElementType::kTetrahedron, {0, 1, 2, 3});
+  const Point corners[] = {{-1, -1, -1}, {-1, 1, -1}, {1, -1, -1}, {1, 1, -0.9375}};
+  for (Slot v = 0; v < 4; ++v) {
+    Point p = corners[v];
+    for (double& x : p) x *= size;
+    EXPECT_TRUE(mesh.MoveVertex(VertexId(v), p).ok());
+  }
+  Commit(mesh);
+  return mesh;
+}
+
+TEST(LocalCheckTest, NothingDependsOnTheSizeOfAnElementWhateverItIs) {
+  const Mesh usual = Sliver(1);
+  for (double size : {0x1p1023, 0x1p520, 0x1p130, 0x1p-130, 0x1p-530, 0x1p-1060}) {
+    const Mesh mesh = Sliver(size);
     for (CheckKind check : AllChecks()) {
-      if (!IsLocal(check) || !LooksAt(check, EntityKind::kCell)) continue;
-      const double value = *ValueAt(mesh, check, CellId(0));
-      const bool is_bad = Fails(check, value, TraitsOf(check).default_threshold);
-      EXPECT_TRUE(is_bad || std::isfinite(value)) << TraitsOf(check).name << " at " << size << ": " << value;
+      for (EntityId id : {EntityId(CellId(0)), EntityId(FaceId(0))}) {
+        if (!IsLocal(check) || !LooksAt(check, id.kind)) continue;
+        EXPECT_EQ(ValueAt(mesh, check, id), ValueAt(usual, check, id))
+            << TraitsOf(check).name << " at " << size;
+      }
     }
+  }
+}
+
+TEST(LocalCheckTest, AnElementThatIsTurnedOverIsBadWhateverItsSize) {
+  for (double size : {0x1p1023, 1.0, 0x1p-1060}) {
+    const Mesh mesh = Sliver(size);
+    EXPECT_LT(*ValueAt(mesh, CheckKind::kInverted, CellId(0)), 0) << size;
+    EXPECT_LT(*ValueAt(mesh, CheckKind::kMinDihedral, CellId(0)), 5) << size;
+    EXPECT_GT(*ValueAt(mesh, CheckKind::kMaxDihedral, CellId(0)), 170) << size;
   }
 }
 

@@ -267,6 +267,32 @@ TEST(OperatorBatchTest, AttributesThatOperatorsSpreadAreLimitedAndZerosAreNotWri
   EXPECT_TRUE(ApplyBatch(mesh, {split}, {.max_attribute_bytes = 2000}).ok());
 }
 
+TEST(OperatorBatchTest, ThePagesThatRowsOfNewVerticesTakeAreLimited) {
+  Mesh mesh = OneTet();
+  const AttributeSpec spec = {"t", EntityKind::kVertex, AttributeType::kFloat64, 16};
+  AddVerticesEdit many;
+  many.positions.assign(3000, Point{0, 0, 0});
+  const std::vector<uint8_t> rows(256, 1);
+  ASSERT_TRUE(
+      ApplyBatch(mesh, {AddAttributeEdit{spec}, many, SetAttributeEdit{spec, {0, 1}, rows}}, {}).ok());
+  SplitEdgesEdit split;
+  split.edges.ends = {0, 1};
+  const std::vector<Edit> batches[] = {
+      {split},
+      {AddVerticesEdit{{{0, 0, 0}}},
+       SetAttributeEdit{spec, {kNewVertex}, {rows.begin(), rows.begin() + 128}}}};
+  for (const std::vector<Edit>& edits : batches) {
+    const std::string before = Describe(mesh);
+    EXPECT_EQ(ErrorReason(ApplyBatch(mesh, edits, {.max_attribute_bytes = 10'000}).status()),
+              reason::kLimitExceeded);
+    EXPECT_EQ(Describe(mesh), before);
+    const size_t bytes = mesh.attributes()[0].memory_bytes();
+    ASSERT_TRUE(ApplyBatch(mesh, edits, {.max_attribute_bytes = 100'000}).ok());
+    EXPECT_LE(mesh.attributes()[0].memory_bytes(), bytes + 100'000);
+    ASSERT_TRUE(ApplyBatch(mesh, {many}, {}).ok());  // the next batch needs another page
+  }
+}
+
 TEST(OperatorBatchTest, RefusalsAreToldInFullForTheFirstHundredOfABatch) {
   Mesh mesh = OneTet();
   std::vector<Edit> edits(60, SwapEdgesEdit{{{77, 78, 79}, {}}, {}});

@@ -1,15 +1,18 @@
 // Random operators on every kind of mesh, sound or broken, in batches that skip what is refused: after each
-// batch the mesh equals brute force in every relation and the boundary, and a mirror proves itself.
+// batch the mesh equals brute force in every relation and the boundary, and a mirror proves itself; at the
+// end all is undone.
 //
 // DYNMESH_OPERATOR_CALLS: how many on each kind of mesh (default 400).
 
 #include <gtest/gtest.h>
 
 #include <cstdlib>
+#include <deque>
 #include <random>
 
 #include "core/delta/diff.h"
 #include "core/delta/mirror.h"
+#include "core/edit/restore_batches.h"
 #include "core/edit/transaction.h"
 #include "tests/support/meshes.h"
 #include "tests/support/oracle.h"
@@ -95,22 +98,46 @@ class Dice {
   std::mt19937 rng_;
 };
 
-/// Applies some operators as one batch, or as a dry run that leaves no trace.
-void ApplyAndCheck(Mesh& mesh, Dice& dice, Mirror& mirror) {
+/// Applies some operators as one batch, whose image it adds to `images`, or as a dry run that leaves no
+/// trace.
+void ApplyAndCheck(Mesh& mesh, Dice& dice, Mirror& mirror, std::deque<BatchImage>& images) {
   std::vector<Edit> edits;
   for (int i = dice.Uniform(4); i >= 0; --i) edits.push_back(dice.AnyOperator());
   BatchOptions options;
   options.skip_refused = true;
   options.dry_run = dice.Uniform(8) == 0;
   options.max_lineage = 100'000;
+  options.make_image = true;
   const std::string before = options.dry_run ? Describe(mesh) : "";
-  const auto result = ApplyBatch(mesh, edits, options);
+  auto result = ApplyBatch(mesh, edits, options);
   ASSERT_TRUE(result.ok()) << result.status();
   if (options.dry_run) {
     ASSERT_EQ(Describe(mesh), before);
+  } else {
+    images.push_front(*std::move(result->image));
   }
   ASSERT_TRUE(mirror.Apply(Diff(mesh, mirror.revision())).ok());
   ExpectEqualsOracle(mesh, ModelOf(mesh));
+}
+
+/// Undoes all batches, last one first.
+void UndoAll(const Mesh& start, const std::deque<BatchImage>& images, Mesh& mesh, Mirror& mirror) {
+  std::vector<const BatchImage*> order;
+  for (const BatchImage& image : images) order.push_back(&image);
+  const auto restored = RestoreBatches(mesh, order, {});
+  ASSERT_TRUE(restored.ok()) << restored.status();
+  ASSERT_EQ(mesh.checksum(), start.checksum());
+  for (EntityKind kind : kEntityKinds) {
+    const auto live = [kind](const Mesh& m) {
+      std::vector<Slot> slots;
+      m.slots(kind).live().ListMembers(slots);
+      return slots;
+    };
+    ASSERT_EQ(live(mesh), live(start));
+  }
+  ExpectEqualsOracle(mesh, ModelOf(mesh));
+  ASSERT_TRUE(mirror.Apply(Diff(mesh, mirror.revision())).ok());
+  ASSERT_EQ(mirror.checksum(), start.checksum());
 }
 
 void RunOn(Mesh start, uint32_t seed) {
@@ -121,10 +148,13 @@ void RunOn(Mesh start, uint32_t seed) {
     Mesh mesh = start.Clone();
     Dice dice(mesh, seed + calls);
     Mirror mirror;
+    std::deque<BatchImage> images;
     for (int batch = 0; batch < 40; ++batch) {
-      ApplyAndCheck(mesh, dice, mirror);
+      ApplyAndCheck(mesh, dice, mirror, images);
       if (::testing::Test::HasFailure()) FAIL() << "seed " << seed + calls << ", batch " << batch;
     }
+    UndoAll(start, images, mesh, mirror);
+    if (::testing::Test::HasFailure()) FAIL() << "seed " << seed + calls << ", undone";
     calls += 100;  // 2.5 a batch
   }
 }
@@ -197,8 +227,9 @@ TEST(OperatorsRandomTest, AttributesThatAreConstantStayConstantAndAMirrorHasThem
     AddConstantColumns(mesh);
     Dice dice(mesh, ++seed);
     Mirror mirror;
+    std::deque<BatchImage> images;
     for (int batch = 0; batch < 30; ++batch) {
-      ApplyAndCheck(mesh, dice, mirror);
+      ApplyAndCheck(mesh, dice, mirror, images);
       for (const AttributeColumn& column : mesh.attributes()) ExpectConstant(mesh, column);
       if (HasFailure()) FAIL() << "seed " << seed << ", batch " << batch;
     }
