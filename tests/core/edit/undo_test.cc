@@ -352,7 +352,8 @@ class BatchDice {
   Edit AnyAttributeEdit() {
     if (mesh_.attributes().size() < 4 && Uniform(3) == 0) {
       const EntityKind kind = kEntityKinds[Uniform(kNumEntityKinds)];
-      AttributeSpec spec = {"a" + std::to_string(mesh_.attributes().size()), kind, AttributeType::kFloat64, 1};
+      AttributeSpec spec = {"a" + std::to_string(mesh_.attributes().size()), kind, AttributeType::kFloat64,
+                            1};
       if (Uniform(2) == 0) spec.default_row = {0, 0, 0, 0, 0, 0, 0xf0, 0x3f};
       return AddAttributeEdit{spec};
     }
