@@ -52,6 +52,16 @@ void Append(Slot slot, const Content& content, BatchImage::Entities& entities) {
                         content.parts.begin() + content.num_parts);
 }
 
+/// Room for what most entities need: of tetrahedra exactly.
+void Expect(size_t count, BatchImage::Entities& entities) {
+  constexpr size_t kTypicalVertices = 4;
+  entities.slots.reserve(count);
+  entities.types.reserve(count);
+  entities.states.reserve(count);
+  entities.vertices.reserve(count * kTypicalVertices);
+  entities.parts.reserve(count * kTypicalVertices);
+}
+
 /// Images may be kept for long.
 void Trim(BatchImage::Entities& entities) {
   entities.slots.shrink_to_fit();
@@ -240,6 +250,7 @@ class ImageBuilder {
     SortSlots(ended);
     SortChanges(changes);
     BatchImage::Entities& kept = image_.ended[Dimension(kind)];
+    if (!ended.empty()) Expect(ended.size(), kept);
     auto change = changes.begin();
     for (Slot slot : ended) {
       Content content = ContentOf(mesh_, {kind, slot});

@@ -1,7 +1,8 @@
 // Undoing and redoing batches: the mesh is as it was, with all ids of all kinds, all attributes and the
 // boundary, and a mirror follows.
 //
-// DYNMESH_UNDO_BATCHES: how many on each kind of mesh (default 30).
+// DYNMESH_UNDO_BATCHES: how many on each kind of mesh (default 30), and 500 times as many operator calls on
+// one.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -306,6 +307,29 @@ class BatchDice {
 
   int Uniform(int below) { return std::uniform_int_distribution<int>(0, below - 1)(rng_); }
 
+  /// One call of an operator, or a small move.
+  Edit AnyOperator() {
+    const bool crowded = mesh_.NumElements(EntityKind::kCell) > 2000;
+    switch (Uniform(crowded ? 3 : 6)) {
+      case 0:
+        return CollapseEdgesEdit{{{Any(EntityKind::kEdge)}, {}}, {}, {}, {}};
+      case 1:
+        return SwapEdgesEdit{{{Any(EntityKind::kEdge)}, {}}, {}};
+      case 2:
+        return SwapFacesEdit{{Any(EntityKind::kFace)}, {}};
+      case 3:
+        return SplitEdgesEdit{{{Any(EntityKind::kEdge)}, {}}, {}, {}, {}};
+      case 4:
+        return SplitElementsEdit{EntityKind::kCell, {Any(EntityKind::kCell)}, {}, {}};
+      default: {
+        const Slot v = Any(EntityKind::kVertex);
+        Point place = mesh_.Position(VertexId(v));
+        place[Uniform(3)] += 1e-3;
+        return MoveVerticesEdit{{v}, {place}};
+      }
+    }
+  }
+
   std::vector<Edit> AnyBatch() {
     std::vector<Edit> edits;
     for (int i = Uniform(4); i >= 0; --i) edits.push_back(AnyEdit());
@@ -352,7 +376,8 @@ class BatchDice {
   Edit AnyAttributeEdit() {
     if (mesh_.attributes().size() < 4 && Uniform(3) == 0) {
       const EntityKind kind = kEntityKinds[Uniform(kNumEntityKinds)];
-      AttributeSpec spec = {"a" + std::to_string(mesh_.attributes().size()), kind, AttributeType::kFloat64, 1};
+      AttributeSpec spec = {"a" + std::to_string(mesh_.attributes().size()), kind, AttributeType::kFloat64,
+                            1};
       if (Uniform(2) == 0) spec.default_row = {0, 0, 0, 0, 0, 0, 0xf0, 0x3f};
       return AddAttributeEdit{spec};
     }
@@ -433,6 +458,39 @@ TEST(UndoRandomTest, BatchesOnEveryKindOfMesh) {
     RunOn(std::move(mesh), ++seed);
     if (HasFailure()) return;
   }
+}
+
+TEST(UndoRandomTest, ManyOperatorCallsAreUndoneToTheFirstStateAndRedone) {
+  const uint32_t seed = 5;
+  SCOPED_TRACE(seed);
+  Mesh mesh = TetGrid(5, 5, 5);
+  BatchDice dice(mesh, seed);
+  const std::string first = DescribeContent(mesh, 0);
+  std::vector<BatchImage> undos;
+  for (int call = 0; call < 500 * NumBatches(); ++call) {
+    auto applied = ApplyBatch(mesh, {dice.AnyOperator()}, {.make_image = true});
+    if (applied.ok()) undos.push_back(*std::move(applied->image));
+  }
+  ASSERT_GT(undos.size(), 50u * NumBatches());
+  const std::string last = DescribeContent(mesh, 0);
+  const auto restore_all = [&](std::vector<BatchImage> images) {
+    std::vector<BatchImage> inverses;
+    while (!images.empty()) {
+      std::vector<const BatchImage*> some;
+      for (size_t i = 0; i < std::min<size_t>(images.size(), 100); ++i) some.push_back(&images.rbegin()[i]);
+      auto restored = RestoreBatches(mesh, some, {});
+      EXPECT_TRUE(restored.ok()) << restored.status();
+      if (!restored.ok()) break;
+      for (BatchImage& image : restored->images) inverses.push_back(std::move(image));
+      images.resize(images.size() - some.size());
+    }
+    EXPECT_THAT(Validate(mesh), IsEmpty());
+    return inverses;
+  };
+  const std::vector<BatchImage> redos = restore_all(std::move(undos));
+  EXPECT_EQ(FirstDifference(DescribeContent(mesh, 0), first), "");
+  restore_all(redos);
+  EXPECT_EQ(FirstDifference(DescribeContent(mesh, 0), last), "");
 }
 
 TEST(UndoRandomTest, PrimitiveEditsOnComplexesWithDuplicatesAndDegenerates) {
