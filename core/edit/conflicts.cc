@@ -24,6 +24,8 @@ std::string JoinSome(const std::vector<Slot>& slots) {
   return text;
 }
 
+}  // namespace
+
 /// Gathers entities of one kind that somebody else changed after a revision.
 class Conflict {
  public:
@@ -64,6 +66,8 @@ class Conflict {
   std::vector<Slot> slots_;
   Stamp changed_ = 0;  ///< the latest
 };
+
+namespace {
 
 /// Notes what the steps of a batch touched.
 class JournalReader {
@@ -121,27 +125,40 @@ bool NamedBy(const ErrorDetail& detail, EntityId& id) {
   return false;
 }
 
-/// The step of a batch that did this to an entity, or null.
-const JournalEntry* FindStep(const Journal& journal, JournalOp op, EntityId id) {
-  for (const JournalEntry& entry : journal.entries) {
-    if (entry.op == op && entry.kind == id.kind && entry.slot == id.slot) return &entry;
+}  // namespace
+
+const JournalEntry* ConflictCheck::Steps::Find(JournalOp op, EntityId id) {
+  const auto& entries = mesh_.journal().entries;
+  for (; read_ < entries.size(); ++read_) {
+    const JournalEntry& entry = entries[read_];
+    if (entry.op != JournalOp::kCreate && entry.op != JournalOp::kDestroy) continue;
+    const uint64_t key = KeyOf(entry.op, {entry.kind, entry.slot});
+    const auto [place, is_new] = places_.try_emplace(key, read_);
+    if (!is_new && !IsAt(place->second, key)) place->second = read_;
   }
-  return nullptr;
+  const auto place = places_.find(KeyOf(op, id));
+  return place != places_.end() && IsAt(place->second, place->first) ? &entries[place->second] : nullptr;
+}
+
+/// False of an entry that was taken back.
+bool ConflictCheck::Steps::IsAt(size_t place, uint64_t key) const {
+  const auto& entries = mesh_.journal().entries;
+  if (place >= entries.size()) return false;
+  const JournalEntry& entry = entries[place];
+  return KeyOf(entry.op, {entry.kind, entry.slot}) == key;
 }
 
 /// Of an entity that was named and is gone, or is another one: perhaps one that the batch has made there.
-void NoteEnd(const Mesh& mesh, EntityId id, Conflict& conflict) {
-  const JournalEntry* made = FindStep(mesh.journal(), JournalOp::kCreate, id);
-  conflict.Note(id, made != nullptr ? made->b : mesh.changed(id.kind).At(id.slot));
-  conflict.Note(id, mesh.slots(id.kind).Born(id.slot));
+void ConflictCheck::NoteEnd(EntityId id, Conflict& conflict) {
+  const JournalEntry* made = steps_.Find(JournalOp::kCreate, id);
+  conflict.Note(id, made != nullptr ? made->b : mesh_.changed(id.kind).At(id.slot));
+  conflict.Note(id, mesh_.slots(id.kind).Born(id.slot));
   const bool leaves_trace = id.kind == EntityKind::kVertex || id.kind == EntityKind::kCell;
   if (!conflict.empty() || leaves_trace) return;
-  const bool was_there = made == nullptr && mesh.IsLive(id);
-  if (was_there || FindStep(mesh.journal(), JournalOp::kDestroy, id) != nullptr) return;
-  conflict.Add(id, static_cast<Stamp>(mesh.revision()));
+  const bool was_there = made == nullptr && mesh_.IsLive(id);
+  if (was_there || steps_.Find(JournalOp::kDestroy, id) != nullptr) return;
+  conflict.Add(id, static_cast<Stamp>(mesh_.revision()));
 }
-
-}  // namespace
 
 absl::Status ConflictCheck::CheckSince(Mesh::Savepoint savepoint) const {
   if (!MayConflict()) return absl::OkStatus();
@@ -152,7 +169,8 @@ absl::Status ConflictCheck::CheckSince(Mesh::Savepoint savepoint) const {
   return conflict.ToStatus();
 }
 
-absl::Status ConflictCheck::Explain(const absl::Status& refused) const {
+absl::Status ConflictCheck::Explain(const absl::Status& refused) {
+  steps_.Shorten();
   const absl::optional<ErrorDetail> detail = MayConflict() ? GetErrorDetail(refused) : absl::nullopt;
   EntityId id;
   if (!detail.has_value() || !NamedBy(*detail, id)) return refused;
@@ -162,7 +180,7 @@ absl::Status ConflictCheck::Explain(const absl::Status& refused) const {
       conflict.Note(e, mesh_.slots(EntityKind::kEdge).Born(e.slot()));
     }
   } else if (detail->reason == reason::kEntityRemoved) {
-    NoteEnd(mesh_, id, conflict);
+    NoteEnd(id, conflict);
   } else if (detail->reason == reason::kNotAnElement) {
     conflict.Note(id, mesh_.changed(id.kind).At(id.slot));
   }

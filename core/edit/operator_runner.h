@@ -62,7 +62,7 @@ class OperatorRunner {
 
   Mesh& mesh_;
   const BatchOptions& options_;
-  const ConflictCheck conflicts_;
+  ConflictCheck conflicts_;
   BatchNames& names_;
   BatchResult& result_;
   size_t num_lineage_ = 0;

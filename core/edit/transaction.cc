@@ -189,7 +189,7 @@ class BatchApplier {
 absl::Status ApplyAll(Mesh& mesh, absl::Span<const Edit> edits, const BatchOptions& options,
                       BatchResult& result) {
   BatchApplier applier(mesh, options, result);
-  const ConflictCheck conflicts(mesh, options.conflict_policy, options.as_of_revision);
+  ConflictCheck conflicts(mesh, options.conflict_policy, options.as_of_revision);
   for (size_t i = 0; i < edits.size(); ++i) {
     result.results.emplace_back();
     const Mesh::Savepoint before = mesh.MakeSavepoint();

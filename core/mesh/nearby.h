@@ -5,19 +5,20 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <utility>
-#include <vector>
+#include <memory>
 
+#include "absl/container/flat_hash_map.h"
+#include "absl/container/inlined_vector.h"
+#include "core/mesh/checksum.h"
 #include "core/mesh/mesh.h"
 
 namespace dynmesh {
 
-/// A hash table of slots for some dozens of entities, which needs no allocation then. Nothing is taken out.
-template <typename Key>
+/// A hash table of slots, which needs no allocation for some dozens of them. Nothing is taken out.
 class NearTable {
  public:
   struct Entry {
-    Key key;
+    uint64_t key;
     Slot slot;
     bool is_new;  ///< made since the table is
   };
@@ -27,8 +28,9 @@ class NearTable {
 
   /// The first entry of this key that `matches(slot)`, or nullptr.
   template <typename Matches>
-  const Entry* Find(Key key, Matches matches) const {
-    for (size_t at = PlaceOf(key); places_[at] != 0; at = (at + 1) & mask_) {
+  const Entry* Find(uint64_t key, Matches matches) const {
+    if (many_ != nullptr) return FindAmongMany(key, matches);
+    for (size_t at = PlaceOf(key); places_[at] != 0; at = (at + 1) % kPlaces) {
       const Entry& entry = entries_[places_[at] - 1];
       if (entry.key == key && matches(entry.slot)) return &entry;
     }
@@ -36,42 +38,46 @@ class NearTable {
   }
 
   void Add(const Entry& entry) {
-    if (2 * (count_ + 1) > mask_) Grow();
+    if (count_ == kFew) BeginMany();
+    if (many_ != nullptr) {
+      (*many_)[entry.key].push_back(entry);
+      return;
+    }
     entries_[count_++] = entry;
-    Put(count_);
+    size_t at = PlaceOf(entry.key);
+    while (places_[at] != 0) at = (at + 1) % kPlaces;
+    places_[at] = count_;
   }
 
  private:
-  static constexpr size_t kInlined = 128;
+  static constexpr size_t kFew = 64;
+  static constexpr size_t kPlaces = 2 * kFew;
 
-  size_t PlaceOf(Key key) const { return (uint64_t{key} * 0x9e3779b97f4a7c15u >> 32) & mask_; }
+  static size_t PlaceOf(uint64_t key) { return (key * 0x9e3779b97f4a7c15u >> 32) % kPlaces; }
 
-  /// Files the number-th entry; 0 is an empty place.
-  void Put(uint32_t number) {
-    size_t at = PlaceOf(entries_[number - 1].key);
-    while (places_[at] != 0) at = (at + 1) & mask_;
-    places_[at] = number;
+  template <typename Matches>
+  const Entry* FindAmongMany(uint64_t key, Matches matches) const {
+    const auto it = many_->find(key);
+    if (it == many_->end()) return nullptr;
+    for (const Entry& entry : it->second) {
+      if (matches(entry.slot)) return &entry;
+    }
+    return nullptr;
   }
 
-  void Grow() {
-    std::vector<Entry> entries(mask_ + 1);
-    std::copy_n(entries_, count_, entries.begin());
-    more_entries_ = std::move(entries);
-    more_places_.assign(2 * (mask_ + 1), 0);
-    entries_ = more_entries_.data();
-    places_ = more_places_.data();
-    mask_ = more_places_.size() - 1;
-    for (uint32_t number = 1; number <= count_; ++number) Put(number);
+  [[gnu::noinline]] void BeginMany() {
+    many_ = std::make_unique<Many>();
+    for (const Entry& entry : entries_) (*many_)[entry.key].push_back(entry);
+    count_ = kFew + 1;
   }
 
-  std::array<uint32_t, kInlined> first_places_ = {};
-  std::array<Entry, kInlined / 2> first_entries_;
-  std::vector<uint32_t> more_places_;  ///< instead of the first ones, once those are too few
-  std::vector<Entry> more_entries_;
-  uint32_t* places_ = first_places_.data();
-  Entry* entries_ = first_entries_.data();
-  size_t mask_ = kInlined - 1;
+  /// Seeded, so that nobody can choose slots that all fall into one place.
+  using Many = absl::flat_hash_map<uint64_t, absl::InlinedVector<Entry, 1>>;
+
+  std::array<uint8_t, kPlaces> places_ = {};  ///< numbers of entries, from 1
+  std::array<Entry, kFew> entries_;
   uint32_t count_ = 0;
+  std::unique_ptr<Many> many_;  ///< all of them, once those are more than few
 };
 
 /// Edges and faces near elements that are replaced: nearly all that the new ones use are among them, or are
@@ -86,7 +92,7 @@ class Mesh::Nearby {
   /// Adds an entity of the mesh with what is below it; a duplicate is left out. Whether it was not there yet.
   bool Gather(FaceId f) {
     const auto vertices = mesh_.Vertices(f);
-    const uint32_t key = SieveOf(vertices);
+    const uint64_t key = KeyOf(vertices);
     const bool known = faces_.Find(key, [f](Slot other) { return other == f.slot(); }) != nullptr;
     if (known || mesh_.IsDuplicate(f)) return false;
     faces_.Add({key, f.slot(), false});
@@ -101,7 +107,7 @@ class Mesh::Nearby {
   }
 
   /// Adds what was just made.
-  void AddNew(FaceId f) { faces_.Add({SieveOf(mesh_.Vertices(f)), f.slot(), true}); }
+  void AddNew(FaceId f) { faces_.Add({KeyOf(mesh_.Vertices(f)), f.slot(), true}); }
   void AddNew(EdgeId e) { edges_.Add({KeyOf(mesh_.Vertices(e)[0], mesh_.Vertices(e)[1]), e.slot(), true}); }
 
   struct EdgeMatch {
@@ -118,7 +124,7 @@ class Mesh::Nearby {
   /// The face with these vertices. `edges` are its edges, `is_new` whether one of them is.
   FaceMatch FindFace(VertexSpan vertices, absl::Span<const EdgeId> edges, bool is_new) const {
     absl::optional<FaceCode> code;
-    const auto* known = faces_.Find(SieveOf(vertices), [&](Slot slot) {
+    const auto* known = faces_.Find(KeyOf(vertices), [&](Slot slot) {
       code = MatchFace(mesh_.Vertices(FaceId(slot)), vertices);
       return code.has_value();
     });
@@ -133,16 +139,16 @@ class Mesh::Nearby {
     return uint64_t{std::min(a, b).slot()} << 32 | std::max(a, b).slot();
   }
 
-  /// Equal cycles have equal exclusive-ors: few others pass.
-  static uint32_t SieveOf(VertexSpan vertices) {
-    uint32_t sieve = 0;
-    for (VertexId v : vertices) sieve ^= v.slot();
-    return sieve;
+  /// Equal cycles have equal sums: hardly any others do.
+  static uint64_t KeyOf(VertexSpan vertices) {
+    uint64_t key = 0;
+    for (VertexId v : vertices) key += Checksum::Mix(v.slot());
+    return key;
   }
 
   const Mesh& mesh_;
-  NearTable<uint64_t> edges_;  ///< by their ends, lower first
-  NearTable<uint32_t> faces_;  ///< by their sieves
+  NearTable edges_;  ///< by their ends, lower first
+  NearTable faces_;
 };
 
 }  // namespace dynmesh

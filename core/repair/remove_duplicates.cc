@@ -57,10 +57,16 @@ class Remover {
     return mesh_.FindEdge(vertices[0], vertices[1]);
   }
 
+  /// Of two equal quads one may measure more than the other, as they are cut along different diagonals.
+  bool IsPrimaryKept(EntityId id) const {
+    if (kind_ == EntityKind::kCell) return false;
+    const EntityId primary = PrimaryOf(id);
+    return mesh_.IsElement(primary) && !IsDegenerate(primary);
+  }
+
   absl::Status CheckDuplicate(EntityId id) {
     DYNMESH_RETURN_IF_ERROR(work_.ChargeBytes(DistinctElements::kBytesOfElement));
-    const bool stays = (kind_ == EntityKind::kCell || !mesh_.IsElement(PrimaryOf(id))) &&
-                       distinct_.Insert({mesh_.Type(id), mesh_.VerticesOf(id)});
+    const bool stays = !IsPrimaryKept(id) && distinct_.Insert({mesh_.Type(id), mesh_.VerticesOf(id)});
     return stays ? absl::OkStatus() : Remove(id, RepairFinding::kDuplicate);
   }
 

@@ -50,8 +50,8 @@ void History::ShrinkTo(uint64_t max_bytes) {
 }
 
 void History::Push(BatchImage image, Stack& stack) {
-  bytes_ += image.memory_bytes();
   stack.push_back(std::move(image));
+  bytes_ += stack.back().memory_bytes();
 }
 
 void History::PopOldest(Stack& stack) {

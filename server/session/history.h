@@ -37,6 +37,9 @@ class History {
   /// A batch has made `revision`; `image` undoes it.
   void Add(BatchImage image, int64_t revision);
 
+  /// A batch has made `revision` and nothing that can be undone: it does not count.
+  void Pass(int64_t revision) { revision_ = revision; }
+
   /// The images to restore, one after the other, for `count` moves. Valid until this changes.
   /// Errors: FAILED_PRECONDITION NOTHING_TO_UNDO or NOTHING_TO_REDO, metadata requested and available.
   absl::StatusOr<std::vector<const BatchImage*>> Last(HistoryMove move, uint32_t count) const;

@@ -190,7 +190,7 @@ absl::StatusOr<Session::AnswerPtr> Session::ApplyLocked(absl::Span<const Edit> e
                                                         const ApplyOptions& options) {
   DYNMESH_RETURN_IF_ERROR(CheckRevisions(options));
   if (edits.empty()) return Unchanged();
-  DYNMESH_RETURN_IF_ERROR(CheckMemory(edits));
+  DYNMESH_ASSIGN_OR_RETURN(const bool is_large, CheckMemory(edits));
   BatchOptions batch;
   if (options.as_of_revision != 0) batch.as_of_revision = options.as_of_revision;
   batch.dry_run = options.validate_only;
@@ -212,9 +212,22 @@ absl::StatusOr<Session::AnswerPtr> Session::ApplyLocked(absl::Span<const Edit> e
   });
   if (!applied.ok()) return applied;
   items_since_check_ += result->num_made;
-  if (result->image.has_value()) history_.Add(*std::exchange(result->image, absl::nullopt), mesh_.revision());
-  if (!options.validate_only) Committed();
+  if (!options.validate_only) {
+    Remember(std::exchange(result->image, absl::nullopt));
+    Committed();
+    if (is_large) MakeRoom(mesh_.memory_bytes());
+  }
   return std::make_shared<const BatchResult>(*std::move(result));
+}
+
+void Session::Remember(absl::optional<BatchImage> image) {
+  if (!image.has_value()) return;
+  if (image->num_items() == 0) return history_.Pass(mesh_.revision());
+  const absl::Status added = CatchExceptions([&] {
+    history_.Add(*std::move(image), mesh_.revision());
+    return absl::OkStatus();
+  });
+  if (!added.ok()) spdlog::warn("undo_forgotten name={} error=\"{}\"", name(), added.ToString());
 }
 
 absl::Status Session::RunEdit(absl::FunctionRef<absl::Status()> fn) {
@@ -237,15 +250,13 @@ absl::Status Session::EditMesh(absl::FunctionRef<absl::StatusOr<BatchEnding>(Mes
     WriterMutexLock lock(&mu_);
     DYNMESH_RETURN_IF_ERROR(gone_);
     DYNMESH_ASSIGN_OR_RETURN(ending, EditLocked(edit));
-    if (ending == BatchEnding::kCommit) Committed();
     ended(mesh_);
   }
   if (ending == BatchEnding::kCommit) followers_.Wake();
   return absl::OkStatus();
 }
 
-absl::StatusOr<BatchEnding> Session::EditLocked(
-    absl::FunctionRef<absl::StatusOr<BatchEnding>(Mesh&)> edit) {
+absl::StatusOr<BatchEnding> Session::EditLocked(absl::FunctionRef<absl::StatusOr<BatchEnding>(Mesh&)> edit) {
   absl::StatusOr<BatchEnding> wanted;
   absl::optional<BatchImage> image;
   const auto edit_and_note = [&] {
@@ -261,8 +272,10 @@ absl::StatusOr<BatchEnding> Session::EditLocked(
     if (*wanted == BatchEnding::kRollBack || !status.ok()) mesh_.Rollback();
     return status;
   }));
-  if (image.has_value()) history_.Add(*std::move(image), mesh_.revision());
   items_since_check_ = kItemsBetweenChecks;
+  if (*wanted == BatchEnding::kRollBack) return wanted;
+  Remember(std::move(image));
+  Committed();
   MakeRoom(mesh_.memory_bytes());
   return wanted;
 }
@@ -283,24 +296,30 @@ absl::Status Session::CheckRevision(absl::optional<int64_t> if_revision) const {
   return expected == now ? absl::OkStatus() : RevisionMismatch(expected, now);
 }
 
-absl::Status Session::CheckMemory(absl::Span<const Edit> edits) {
-  if (std::none_of(edits.begin(), edits.end(), Grows)) return absl::OkStatus();
+absl::StatusOr<bool> Session::CheckMemory(absl::Span<const Edit> edits) {
+  if (std::none_of(edits.begin(), edits.end(), Grows)) return false;
   for (const Edit& edit : edits) items_since_check_ += NumItems(edit);
   const uint64_t growth = AttributeGrowth(mesh_, edits);
-  if (items_since_check_ < kItemsBetweenChecks && growth < kBytesBetweenChecks) return absl::OkStatus();
+  if (items_since_check_ < kItemsBetweenChecks && growth < kBytesBetweenChecks) return false;
   const uint64_t bytes = mesh_.memory_bytes() + growth;
   if (bytes > limits().max_session_bytes) {
     return LimitExceeded("max_session_bytes", limits().max_session_bytes, bytes);
   }
-  MakeRoom(bytes);
   items_since_check_ = 0;
-  return absl::OkStatus();
+  return true;
 }
 
 void Session::MakeRoom(uint64_t mesh_bytes) {
   const uint64_t max_bytes = limits().max_session_bytes;
   if (mesh_bytes + spatial_.memory_bytes() + history_.memory_bytes() > max_bytes) spatial_.Clear();
   history_.ShrinkTo(max_bytes - std::min(mesh_bytes, max_bytes));
+  CountHistory();
+}
+
+void Session::CountHistory() {
+  num_undoable_.store(history_.size(HistoryMove::kUndo));
+  num_redoable_.store(history_.size(HistoryMove::kRedo));
+  history_bytes_.store(history_.memory_bytes());
 }
 
 Session::AnswerPtr Session::Unchanged() const {
@@ -316,9 +335,7 @@ void Session::Committed() {
   revision_.store(mesh_.revision());
   for (EntityKind kind : kEntityKinds) num_live_[Dimension(kind)].store(mesh_.NumLive(kind));
   history_.Follow(mesh_.revision());
-  num_undoable_.store(history_.size(HistoryMove::kUndo));
-  num_redoable_.store(history_.size(HistoryMove::kRedo));
-  history_bytes_.store(history_.memory_bytes());
+  CountHistory();
 }
 
 absl::Status Session::Update(const SettingsUpdate& update, absl::string_view etag, const StopSignal& stop) {

@@ -239,7 +239,11 @@ class Session : public std::enable_shared_from_this<Session> {
   /// The result of fn(), which edits mesh_. When that throws, an edit has been left half way: the session is
   /// damaged then, and its error is returned.
   absl::Status RunEdit(absl::FunctionRef<absl::Status()> fn) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
-  absl::Status CheckMemory(absl::Span<const Edit> edits) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
+  /// Whether the edits, with those since it was last so, are enough to measure memory for.
+  absl::StatusOr<bool> CheckMemory(absl::Span<const Edit> edits) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
+  /// Keeps what undoes the batch that was just committed. Where memory runs out all is forgotten.
+  void Remember(absl::optional<BatchImage> image) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
+  void CountHistory() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
   /// An index can be made again: it goes when the mesh needs its room, and what undoes batches goes next.
   void MakeRoom(uint64_t mesh_bytes) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
   AnswerPtr Unchanged() const ABSL_SHARED_LOCKS_REQUIRED(mu_);
