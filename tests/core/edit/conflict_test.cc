@@ -188,6 +188,25 @@ TEST_F(ConflictTest, WithSkipRefusedJustTheItemsThatConflictArePassedOver) {
   ExpectEqualsOracle(mesh_, ModelOf(mesh_));
 }
 
+TEST_F(ConflictTest, ManyItemsThatAreGoneAreExplainedInLinearTime) {
+  constexpr size_t kMany = 200'000;
+  const Slot vertex = mesh_.slots(EntityKind::kVertex).limit();
+  Theirs({AddVerticesEdit{{{9, 9, 9}}}});
+  Theirs({RemoveVerticesEdit{{vertex}}});
+  AddVerticesEdit long_journal;
+  long_journal.positions.assign(kMany, Point{7, 7, 7});
+  BatchOptions options;
+  options.as_of_revision = 3;
+  options.conflict_policy = ConflictPolicy::kTouched;
+  options.skip_refused = true;
+  const auto applied =
+      ApplyBatch(mesh_, {long_journal, DissolveVerticesEdit{std::vector<Slot>(kMany, vertex), {}}}, options);
+  ASSERT_TRUE(applied.ok()) << applied.status();
+  EXPECT_EQ(applied->results[1].skipped.size(), kMany);
+  ASSERT_EQ(applied->results[1].refusals.size(), kMaxRefusals);
+  EXPECT_EQ(ErrorReason(applied->results[1].refusals[0].status), reason::kConflict);
+}
+
 TEST_F(ConflictTest, WhatABatchDoesTwiceIsNone) {
   Theirs({MoveVerticesEdit{{CornerOf(kFirst, 0)}, {{0, 0.1, 0}}}});
   ExpectAccepted({SetAttributeEdit{kMaterial, {kLast}, kOne}, SetAttributeEdit{kMaterial, {kLast}, kZero},

@@ -142,6 +142,30 @@ TEST_P(ExtremesTest, HubsKeepStoredRelationsInLinearTime) {
 INSTANTIATE_TEST_SUITE_P(Builds, ExtremesTest, ::testing::Bool(),
                          [](const auto& bulk) { return bulk.param ? "InBulk" : "OneByOne"; });
 
+TEST(ExtremesReplaceTest, TheStarOfAHubWhoseNeighborsAreNumberedInOrder) {
+  constexpr Slot kPairs = 100'000;
+  Input input{{{0, 0, 1}, {0, 0, 2}}, ElementType::kTriangle, {}};
+  for (Slot k = 0; k < kPairs; ++k) {
+    input.positions.push_back(OnCircle(2 * k, 2 * kPairs));
+    input.positions.push_back(OnCircle(2 * k + 1, 2 * kPairs));
+    for (Slot v : {Slot{0}, 2 + 2 * k, 3 + 2 * k}) input.vertices.push_back(VertexId(v));
+  }
+  Mesh mesh = Bulk(input);
+  std::vector<EntityId> removed;
+  std::vector<NewElement> added;
+  for (Slot f = 0; f < kPairs; ++f) {
+    const auto triangle = mesh.Vertices(FaceId(f));
+    removed.push_back(FaceId(f));
+    added.emplace_back(ElementType::kTriangle, absl::MakeConstSpan({VertexId(1), triangle[1], triangle[2]}));
+  }
+  mesh.BeginBatch();
+  ASSERT_TRUE(mesh.ReplaceElements(removed, added, [](size_t, EntityId) {}).ok());
+  Commit(mesh);
+  EXPECT_EQ(mesh.IncidentEdges(VertexId(1)).size(), 2 * kPairs);
+  EXPECT_EQ(mesh.NumLive(EntityKind::kEdge), 3 * kPairs);
+  EXPECT_TRUE(Validate(mesh).empty());
+}
+
 TEST(ExtremesLimitsTest, AMeshEmptiedAndRefilledTenTimesUsesItsMemoryAgain) {
   const Mesh source = TetGrid(14, 14, 14);
   Input cells{{}, ElementType::kTetrahedron, {}};

@@ -254,6 +254,18 @@ TEST(RemoveDuplicatesTest, FlatElementsGoUpToAMeasureUnlessShapeDoesNotMatter) {
   EXPECT_EQ(Repair(thin, RemoveDuplicatesStep{{.max_measure = 0.002}}).Count(RepairFinding::kDegenerate), 2u);
 }
 
+TEST(RemoveDuplicatesTest, OneOfTwoEqualQuadsStaysThoughJustOneIsFlat) {
+  Mesh mesh;
+  for (const Point& p : {Point{0, 0, 0}, Point{1, 0, 0}, Point{0, 0, 0}, Point{0, 1, 0}}) {
+    ASSERT_TRUE(mesh.AddVertex(p).ok());
+  }
+  Add(mesh, ElementType::kQuad, {0, 1, 2, 3});
+  Add(mesh, ElementType::kQuad, {1, 2, 3, 0});
+  Commit(mesh);
+  EXPECT_EQ(Repair(mesh, RemoveDuplicatesStep{}).Count(RepairFinding::kDegenerate), 1u);
+  EXPECT_EQ(mesh.NumElements(EntityKind::kFace), 1u);
+}
+
 TEST(RemoveDuplicatesTest, IsolatedVerticesGoWhenAskedFor) {
   Mesh mesh = TetWithDanglers();
   const RepairReport report = Repair(mesh, RemoveDuplicatesStep{{.isolated_vertices = true}});
