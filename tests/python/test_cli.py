@@ -44,6 +44,36 @@ def mesh_file(tmp_path):
     return tmp_path / "tets.vtu"
 
 
+def test_operators_change_what_is_named_and_a_dry_run_tells(run, mesh_file):
+    assert run("create", "ops", mesh_file).returncode == 0
+    dry = json.loads(run("split", "ops", "--ends", "0", "1", "--at", "0.25", "--dry-run", "--json").stdout)
+    assert (dry["revision"], dry["counts"]["vertices"]) == (1, 6)
+    text = run("split", "ops", "--ends", 0, 1, "--at", "0.25").stdout
+    assert text.startswith("revision 2: 6 vertices") and "new vertices: 5\n" in text
+    smoothed = json.loads(run("smooth", "ops", "--move-boundary", "--min-quality", "0.01", "--json").stdout)
+    assert (smoothed["revision"], smoothed["skipped"]) == (3, [])
+    refused = run("swap", "ops", "--ends", 0, 5)
+    assert refused.returncode == 1 and refused.stderr.startswith("dynmesh: ") and "[BOUNDARY]" in refused.stderr
+    places = ("--ends", 0, 5, 0, 4000)
+    skipped = json.loads(run("swap", "ops", *places, "--skip-refused", "--json").stdout)
+    assert skipped["skipped"] == [0, 1]
+    assert [refusal["reason"] for refusal in skipped["refusals"]] == ["BOUNDARY", "UNKNOWN_ENTITY"]
+    assert "item 1: UNKNOWN_ENTITY" in run("swap", "ops", *places, "--skip-refused").stdout
+    assert run("collapse", "ops", "--ends", 0, 5, "--at", "0").stdout.startswith("revision 6: 5 vertices")
+
+
+def test_elements_are_split_and_vertices_dissolved(run, mesh_file):
+    assert run("create", "parts", mesh_file).returncode == 0
+    split = json.loads(run("split", "parts", "0", "--kind", "cell", "--json").stdout)
+    assert (split["new_vertices"], split["counts"]["cells"]) == ([5], 5)
+    assert run("dissolve", "parts", 5).stdout.startswith("revision 3: 5 vertices")
+
+
+def test_operators_whose_names_make_no_sense_are_wrong_usage(run):
+    for arguments in (("--ends", 1), ("--ends", 1, 2, "--kind", "cell"), ("--ends", 1, 2, "--faces"), ()):
+        assert run("split" if "--faces" not in arguments else "swap", "none", *arguments).returncode == 2
+
+
 def test_a_repair_tells_what_it_did_and_a_dry_run_what_it_would_do(run, tmp_path):
     points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 0], [1, 0, 0], [0, -1, 0], [9, 9, 9]], dtype=float)
     meshio.write_points_cells(tmp_path / "halves.vtu", points, {"triangle": np.array([[0, 1, 2], [3, 5, 4]])})

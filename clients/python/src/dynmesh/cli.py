@@ -16,6 +16,7 @@ import numpy as np
 
 from .cli_adapt import adapt, add_adapt
 from .cli_check import add_check, describe_report, run_check
+from .cli_edit import add_operators, operate
 from .cli_query import add_questions
 from .cli_repair import add_repair_options, describe_repair, repair, repair_record
 from .cli_watch import watch
@@ -109,6 +110,7 @@ def _add_writing(commands: Any) -> None:
     fill.add_argument("name", metavar="NAME")
     fill.add_argument("file", metavar="FILE", help="any format that meshio reads")
     _add_import_options(fill)
+    add_operators(lambda name, text: _command(commands, name, _operate, text))
     add_adapt(lambda name, text: _command(commands, name, _adapt, text))
     store = _command(
         commands,
@@ -204,6 +206,10 @@ def _check_together(parser: argparse.ArgumentParser, args: argparse.Namespace) -
     relations = getattr(args, "relations", [])
     if None in relations and len(relations) > 1:
         parser.error("none stands alone: it switches all relations to on demand")
+    if getattr(args, "ends", False) and len(args.ids) % 2 != 0:
+        parser.error("--ends: the IDs are pairs of vertices, and one is left over")
+    if getattr(args, "ends", False) and (getattr(args, "faces", False) or getattr(args, "kind", None)):
+        parser.error("--ends names edges, which --faces and --kind do not")
 
 
 def _create(args: argparse.Namespace) -> None:
@@ -238,6 +244,12 @@ def _store(args: argparse.Namespace) -> None:
     with _client(args) as client:
         wanted = [relation for relation in args.relations if relation is not None]
         _print_info(args, client.session(args.name).store_relations(wanted))
+
+
+def _operate(args: argparse.Namespace) -> None:
+    with _client(args) as client:
+        record, text = operate(client.session(args.name), args)
+    _print(args, record, text)
 
 
 def _repair(args: argparse.Namespace) -> None:
