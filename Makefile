@@ -40,7 +40,7 @@ cmake --build --preset $(1) -j $(JOBS) && ctest --preset $(1) -j $(JOBS)
 endef
 
 bench:
-	@scripts/setup.sh server bench
+	@scripts/setup.sh build bench demo
 	@MESHES="$(MESHES)" tests/bench/run.sh
 
 image-test: configure

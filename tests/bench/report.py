@@ -10,7 +10,7 @@ TYPES = {"tetrahedron": "tetrahedra", "hexahedron": "hexahedra", "triangle": "tr
 class Run:
     """One program on one mesh in one order."""
 
-    family: str  # core, memory or scale
+    family: str  # core, memory, service or scale
     mesh: str
     order: str
     context: dict
@@ -149,6 +149,17 @@ def _operators(run):
     return markdown(["operator, at random places", "rate", "x rate by elements", "x rate of peers"], rows)
 
 
+def _service(run):
+    rows = []
+    for name, found in run.benchmarks.items():
+        if name.startswith("rpc/"):
+            rows.append([name, f"{run.rate(name) / 1e3:.2f} K/s", "-"])
+        else:
+            angle = f"{found['angle']:.1f} degrees, {found['elements']} elements"
+            rows.append([name, time_text(run.ns(name)), angle])
+    return markdown(["operator and size of a batch, adaptation", "rate or time", "smallest angle"], rows)
+
+
 def _against_limit(run, prefix):
     rows = []
     for task in _tasks(run, prefix):
@@ -189,6 +200,9 @@ def details(runs):
                   markdown(["boundary and diff", "time", "x limit", "x warm limit"],
                            _against_limit(run, "boundary/") + _against_limit(run, "diff/")), "",
                   _edits(run), "", _operators(run), "", _locality(run), ""]
+    for run in runs:
+        if run.family == "service":
+            parts += [f"## {run.mesh} through the daemon: {run.elements} {TYPES[run.type]}", "", _service(run), ""]
     scale = sorted((run for run in runs if run.family == "scale"), key=lambda run: run.elements)
     return "\n".join(parts + ["## Scale", "", _scale(scale)])
 

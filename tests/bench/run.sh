@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Builds and runs the benchmarks of core/, prints ratios with their targets, writes RESULTS.md and
+# Builds and runs the benchmarks of core/ and of the daemon, prints ratios with their targets, writes RESULTS.md and
 # build/bench/core.json. Wants a quiet machine and some twenty minutes.
 #
 # usage: tests/bench/run.sh
@@ -27,9 +27,8 @@ flags=(
 )
 [ -z "${MESHES:-}" ] || [ -d "$meshes" ] || { echo "run.sh: no folder $meshes" >&2; exit 2; }
 
-cmake --preset release -B $build -DDYNMESH_BENCH=ON -DDYNMESH_TESTS=OFF -DDYNMESH_SERVER=OFF -DDYNMESH_PYTHON=OFF \
-  >/dev/null
-cmake --build $build --target core_bench memory_bench scale_bench
+cmake --preset release -B $build -DDYNMESH_BENCH=ON -DDYNMESH_TESTS=OFF >/dev/null
+cmake --build $build --target core_bench memory_bench scale_bench dynmeshd dynmesh_python
 rm -rf $reports $arrays
 mkdir -p $reports $arrays
 
@@ -61,6 +60,12 @@ for source in "${sources[@]}"; do
     run "core.$name.$order" core_bench "$source" $order
   done
   run "memory.$name.hilbert" memory_bench "$source" hilbert
+done
+for file in "$meshes"/*_t*.vtu; do # tetrahedra and triangles
+  [ -e "$file" ] || continue
+  echo "== service_bench.py $file"
+  PYTHONPATH=$build/python /usr/bin/python3 tests/bench/service_bench.py $build/server/dynmeshd "$file" \
+    "$reports/service.$(basename "$file" .vtu).hilbert.json"
 done
 for size in ${SCALE:-100000 800000}; do
   run "scale.$size.hilbert" scale_bench "$size"

@@ -36,7 +36,7 @@ def main(reports, core_json, results):
     text = "\n".join([
         "# Results of `make bench`", "",
         f"{machine()}; one thread; commit {commit()}; {datetime.date.today()}.", "",
-        "Medians of CPU time; every ratio is of two figures of one process. `limit` is a loop over plain arrays, or",
+        "Medians of CPU time, through the daemon of wall time; every ratio is of two figures of one process. `limit` is a loop over plain arrays, or",
         "the builder of such arrays: see [limit/](limit). Whatever has a figure gave the same answer as its limit,",
         "checked row by row before it was timed. On demand over all rows goes through `ForEachRow(mesh, relation,",
         "fn)`; relations that a mesh always has count as stored.", "",

@@ -80,6 +80,17 @@ def _operators(table, run):
             table.at_least(what, rate, 60e3)
 
 
+def _service(table, run, core):
+    rate = core and core.rate("edit/split")
+    table.at_least(f"split, {run.mesh}: rate through the daemon in batches of 10,000 / in process",
+                   run.rate("rpc/split/10000") / rate if rate else None, 0.7, report.ratio_text)
+    for name in ("adapt/half", "adapt/double"):
+        found = run.benchmarks.get(name)
+        if found:
+            table.at_least(f"{name}, {run.mesh}: smallest angle after / before",
+                           found["angle"] / found["angle_before"], 1.0, report.ratio_text)
+
+
 def _locality(table, run):
     fresh = [name for name in run.benchmarks if name.startswith("locality/fresh/")]
     for name in fresh:
@@ -115,6 +126,10 @@ def table(runs):
     for run in of_tets:
         if run.family == "memory":
             _memory(result, run)
+    for run in runs:
+        if run.family == "service":
+            _service(result, run, next((c for c in runs if (c.family, c.mesh, c.order) == ("core", run.mesh, run.order)),
+                                       None))
     _scale(result, [run for run in of_tets if run.family == "scale"])
     mesh = core[0].mesh if core else "tetrahedra"
     return report.markdown([f"{mesh}", "wanted", "measured", ""], result.rows)
