@@ -16,8 +16,9 @@ constexpr size_t kMaxIds = 16;  ///< in an error
 /// A pass that resizes fewer edges than one in so many is the last one.
 constexpr uint64_t kFewOf = 500;
 
-/// Entities that one step may look at before it ends, as max_attempts is meant for vertices of few elements.
-constexpr uint64_t kMaxStepWork = 50'000'000;
+/// Entities that one step may look at before it ends, as max_attempts is meant for vertices of few elements: a
+/// second's work or two.
+constexpr uint64_t kMaxStepWork = 20'000'000;
 
 /// Rounds over the worst elements at the end, as long as each finds something.
 constexpr int kMaxRounds = 4;

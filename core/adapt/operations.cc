@@ -86,7 +86,8 @@ Point NormalOf(const Mesh& mesh, absl::Span<const VertexId> triangle) {
 double Operations::cos_turn() const { return std::cos(state_.options.feature_angle / 2); }
 
 absl::StatusOr<bool> Operations::Count(const absl::Status& outcome, uint64_t& counter) {
-  work_ += patch_.work;
+  constexpr uint64_t kWorkToReplace = 10;  // an element: checking it, linking it, and its images
+  work_ += patch_.work + kWorkToReplace * (patch_.removed.size() + patch_.added.size());
   if (outcome.ok()) {
     ++counter;
     Touch();

@@ -45,7 +45,8 @@ absl::Status Sizing::CheckAttribute(const Mesh& mesh) const {
   }
   std::vector<Slot> bad;
   mesh.slots(EntityKind::kVertex).live().ForEach([&](Slot v) {
-    if (!(TargetAt(mesh, VertexId(v)) > 0) && bad.size() < 16) bad.push_back(v);
+    const double target = TargetAt(mesh, VertexId(v));
+    if (!(target > 0 && std::isfinite(target)) && bad.size() < 16) bad.push_back(v);
   });
   if (bad.empty()) return absl::OkStatus();
   return InvalidArgument(reason::kBadArgument, "a target length is not positive",

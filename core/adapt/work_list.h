@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/mesh/bit_set.h"
 #include "core/mesh/ids.h"
 
 namespace dynmesh {
@@ -13,11 +14,14 @@ namespace dynmesh {
 /// Slots that wait for one phase of an adaptation, the most urgent first; equally urgent ones by slot, so
 /// that the same mesh always gives the same result.
 ///
-/// An entity may be gone, or another one, when its turn comes: who takes a slot looks again at what it is.
-/// Cost: to add and take, O(log n). Thread safety: that of std::vector.
+/// A slot waits once: while it does, adding it again changes nothing, so that there are never more than
+/// slots. An entity may be gone, or another one, when its turn comes: who takes a slot looks again at what it
+/// is. Cost: to add and take, O(log n). Thread safety: that of std::vector.
 class WorkList {
  public:
   void Add(double urgency, Slot slot) {
+    if (waiting_.Test(slot)) return;
+    waiting_.Set(slot);
     items_.push_back({urgency, slot});
     std::push_heap(items_.begin(), items_.end(), IsLater);
     ++num_added_;
@@ -28,11 +32,13 @@ class WorkList {
     std::pop_heap(items_.begin(), items_.end(), IsLater);
     const Slot slot = items_.back().second;
     items_.pop_back();
+    waiting_.Clear(slot);
     return slot;
   }
 
   void Clear() {
     items_.clear();
+    waiting_ = BitSet();
     num_added_ = 0;
   }
 
@@ -49,6 +55,7 @@ class WorkList {
   }
 
   std::vector<Item> items_;  ///< a heap
+  BitSet waiting_;           ///< their slots
   uint64_t num_added_ = 0;
 };
 

@@ -17,7 +17,7 @@ constexpr char kRpc[] = "AdaptSession";
 }  // namespace
 
 AdaptReactor* AdaptReactor::Start() {
-  const absl::Status posted = PostStart();
+  const absl::Status posted = CatchExceptions([this] { return PostStart(); });
   if (!posted.ok()) EndWith(posted);
   return this;
 }
@@ -25,63 +25,64 @@ AdaptReactor* AdaptReactor::Start() {
 absl::Status AdaptReactor::PostStart() {
   DYNMESH_ASSIGN_OR_RETURN(const SessionPtr session, services_.registry.Find(request_.session()));
   return PostWork(services_, session, {AccessMode::kRead, /*heavy=*/true, request_.ByteSizeLong()},
-                  [this, session](AccessGrant grant) { StartAdaptation(session, std::move(grant)); });
+                  [this, session](AccessGrant grant) {
+                    GoOnAfter(CatchExceptions([&] { return Begin(session, std::move(grant)); }));
+                  });
 }
 
+/// Whatever fails, also for want of memory, ends the call.
 void AdaptReactor::PostNext(AccessMode mode, Work work) {
-  services_.heavy().Post([this, mode, work] {
-    AccessGrant grant = adaptation_->session().access().Acquire(mode);
-    (this->*work)(std::move(grant));
+  const auto run = [this, mode, work] {
+    GoOnAfter(CatchExceptions([&] { return (this->*work)(adaptation_->session().access().Acquire(mode)); }));
+  };
+  const absl::Status posted = CatchExceptions([&] {
+    services_.heavy().Post(run);
+    return absl::OkStatus();
   });
+  if (!posted.ok()) EndWith(posted);
 }
 
-void AdaptReactor::StartAdaptation(const SessionPtr& session, AccessGrant grant) {
-  absl::Status started = stop_.Check();
-  if (started.ok()) {
-    started = CatchExceptions([&]() -> absl::Status {
-      DYNMESH_RETURN_IF_ERROR(CheckMessageSize(request_, services_.limits()));
-      DYNMESH_ASSIGN_OR_RETURN(const AdaptOptions options, ToAdaptOptions(request_, services_.limits()));
-      DYNMESH_ASSIGN_OR_RETURN(adaptation_,
-                               Adaptation::Start(session, services_.registry.adaptation_budget(), options));
-      return absl::OkStatus();
-    });
-  }
-  grant.Release();
-  started.ok() ? GoOn() : EndWith(started);
-}
-
-void AdaptReactor::GoOn() {
+void AdaptReactor::GoOnAfter(const absl::Status& status) {
+  if (!status.ok() || concluded_) return EndWith(status);
   if (adaptation_->done()) return PostNext(AccessMode::kRead, &AdaptReactor::Conclude);
   PostNext(AccessMode::kWrite, &AdaptReactor::Step);
 }
 
-void AdaptReactor::Step(AccessGrant grant) {
-  absl::Status status = stop_.Check();
-  if (status.ok()) status = CatchExceptions([this] { return adaptation_->Step(); });
-  grant.Release();
-  if (!status.ok()) return EndWith(status);
-  WriteProgress();
-  GoOn();
+absl::Status AdaptReactor::Begin(const SessionPtr& session, AccessGrant) {
+  DYNMESH_RETURN_IF_ERROR(stop_.Check());
+  DYNMESH_RETURN_IF_ERROR(CheckMessageSize(request_, services_.limits()));
+  DYNMESH_ASSIGN_OR_RETURN(const AdaptOptions options, ToAdaptOptions(request_, services_.limits()));
+  DYNMESH_ASSIGN_OR_RETURN(adaptation_,
+                           Adaptation::Start(session, services_.registry.adaptation_budget(), options));
+  return absl::OkStatus();
 }
 
-void AdaptReactor::Conclude(AccessGrant grant) {
-  const absl::Status status = CatchExceptions([this]() -> absl::Status {
-    DYNMESH_RETURN_IF_ERROR(stop_.Check());
-    DYNMESH_ASSIGN_OR_RETURN(const AdaptResult result, adaptation_->Finish());
-    FromAdaptResult(result, adaptation_->revision(), result_.mutable_result());
-    return absl::OkStatus();
-  });
+absl::Status AdaptReactor::Step(AccessGrant grant) {
+  DYNMESH_RETURN_IF_ERROR(stop_.Check());
+  DYNMESH_RETURN_IF_ERROR(adaptation_->Step());
   grant.Release();
-  EndWith(status);
+  WriteProgress();
+  return absl::OkStatus();
+}
+
+absl::Status AdaptReactor::Conclude(AccessGrant) {
+  DYNMESH_RETURN_IF_ERROR(stop_.Check());
+  DYNMESH_ASSIGN_OR_RETURN(const AdaptResult result, adaptation_->Finish());
+  FromAdaptResult(result, adaptation_->revision(), result_.mutable_result());
+  concluded_ = true;
+  return absl::OkStatus();
 }
 
 void AdaptReactor::WriteProgress() {
   {
     MutexLock lock(&mu_);
-    if (writing_) return;
-    writing_ = true;
+    if (writing_) return;  // nobody else begins to write before the end
   }
   FromAdaptProgress(adaptation_->progress(), adaptation_->revision(), progress_.mutable_progress());
+  {
+    MutexLock lock(&mu_);
+    writing_ = true;  // last: memory may have run out before
+  }
   StartWrite(&progress_);
 }
 

@@ -35,15 +35,15 @@ class AdaptReactor final : public grpc::ServerWriteReactor<v1::AdaptSessionRespo
   void OnDone() override { delete this; }
 
  private:
-  using Work = void (AdaptReactor::*)(AccessGrant);
+  using Work = absl::Status (AdaptReactor::*)(AccessGrant);
 
   absl::Status PostStart();
   /// Runs `work` when it is its turn.
   void PostNext(AccessMode mode, Work work);
-  void StartAdaptation(const SessionPtr& session, AccessGrant grant);
-  void Step(AccessGrant grant);
-  void Conclude(AccessGrant grant);
-  void GoOn();
+  void GoOnAfter(const absl::Status& status);
+  absl::Status Begin(const SessionPtr& session, AccessGrant grant);
+  absl::Status Step(AccessGrant grant);
+  absl::Status Conclude(AccessGrant grant);
   void WriteProgress() ABSL_LOCKS_EXCLUDED(mu_);
   /// Ends the call, after the write that is in flight. Called once.
   void EndWith(const absl::Status& status) ABSL_LOCKS_EXCLUDED(mu_);
@@ -55,6 +55,7 @@ class AdaptReactor final : public grpc::ServerWriteReactor<v1::AdaptSessionRespo
   std::unique_ptr<Adaptation> adaptation_;
   v1::AdaptSessionResponse progress_;
   v1::AdaptSessionResponse result_;
+  bool concluded_ = false;  ///< result_ is there
 
   Mutex mu_;
   bool writing_ ABSL_GUARDED_BY(mu_) = false;

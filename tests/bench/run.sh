@@ -27,7 +27,8 @@ flags=(
 )
 [ -z "${MESHES:-}" ] || [ -d "$meshes" ] || { echo "run.sh: no folder $meshes" >&2; exit 2; }
 
-cmake --preset release -B $build -DDYNMESH_BENCH=ON -DDYNMESH_TESTS=OFF >/dev/null
+cmake --preset release -B $build -DDYNMESH_BENCH=ON -DDYNMESH_TESTS=OFF -DDYNMESH_SERVER=ON -DDYNMESH_PYTHON=ON \
+  >/dev/null
 cmake --build $build --target core_bench memory_bench scale_bench dynmeshd dynmesh_python
 rm -rf $reports $arrays
 mkdir -p $reports $arrays

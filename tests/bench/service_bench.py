@@ -75,7 +75,7 @@ def smallest_dihedral(session):
     """In degrees; of surfaces the smallest angle of a triangle."""
     report = session.check({"min_dihedral": 180.0, "min_face_angle": 180.0}, progress=False)
     name = "min_dihedral" if session.info().element_counts.cells else "min_face_angle"
-    return float(report[name].values.min())
+    return float(report[name].lowest)
 
 
 def time_adaptation(client, mesh):

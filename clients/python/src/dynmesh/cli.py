@@ -210,6 +210,8 @@ def _check_together(parser: argparse.ArgumentParser, args: argparse.Namespace) -
         parser.error("--ends: the IDs are pairs of vertices, and one is left over")
     if getattr(args, "ends", False) and (getattr(args, "faces", False) or getattr(args, "kind", None)):
         parser.error("--ends names edges, which --faces and --kind do not")
+    if getattr(args, "kind", None) and getattr(args, "at", None) is not None:
+        parser.error("--at is a place on an edge, and --kind names elements")
 
 
 def _create(args: argparse.Namespace) -> None:

@@ -20,7 +20,7 @@ def add_operators(add: AddCommand) -> None:
     split = add("split", "Put a vertex on each edge, or into each element.")
     _add_places(split, "edges, or elements of --kind", ends=True)
     split.add_argument("--kind", choices=("edge", "face", "cell"), help="split elements of this kind at their middles")
-    split.add_argument("--at", metavar="T", type=float, default=0.5, help="where on the edge, 0 to 1 (0.5)")
+    split.add_argument("--at", metavar="T", type=float, help="where on the edge, 0 to 1 (0.5)")
     collapse = add("collapse", "Draw each edge together.")
     _add_places(collapse, "edges", ends=True)
     collapse.add_argument("--at", metavar="T", type=float, help="where on the edge (middle, or on the boundary)")
@@ -28,7 +28,7 @@ def add_operators(add: AddCommand) -> None:
     _add_places(swap, "edges, or faces", ends=True)
     swap.add_argument("--faces", action="store_true", help="IDs are faces between two tetrahedra")
     smooth = add("smooth", "Move vertices to where the elements round them are better.")
-    _add_places(smooth, "vertices (all)", ends=False, at_least_one=False)
+    _add_places(smooth, "vertices (all: up to a million, times the iterations)", ends=False, at_least_one=False)
     smooth.add_argument("--method", choices=("guarded", "laplacian", "optimizing"), default="guarded", help="(guarded)")
     smooth.add_argument("--iterations", metavar="N", type=int, default=1, help="(1)")
     smooth.add_argument("--move-boundary", action="store_true", help="vertices of the boundary, too")
@@ -91,7 +91,7 @@ def _swap(_: Session, tx: Any, args: argparse.Namespace) -> None:
 
 
 def _smooth(session: Session, tx: Any, args: argparse.Namespace) -> None:
-    ids: Any = args.ids or session.snapshot().vertex_ids
+    ids: Any = args.ids or session.snapshot(progress=False).vertex_ids
     tx.smooth_vertices(
         ids, method=args.method, iterations=args.iterations, move_boundary=args.move_boundary, **_limits(args)
     )

@@ -417,7 +417,8 @@ class Session(SessionChecks):
 
         By splits, collapses, swaps and moves, in passes. Kept are the topology, the orientation of elements, sharp
         edges and corners with their places, and the form of surfaces up to half of `feature_angle`; and no angle
-        gets smaller than the smallest one at the start, or than 12 degrees. Each pass is a revision, or several:
+        gets smaller than the smallest one at the start, or than 12 degrees. Making a curved surface many times
+        coarser loses volume, as deviations add up. Each pass is a revision, or several:
         others can edit in between, and mirrors follow. When this is interrupted, what was done until then stays.
 
         Parameters
