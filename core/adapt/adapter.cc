@@ -16,9 +16,14 @@ constexpr size_t kMaxIds = 16;  ///< in an error
 /// A pass that resizes fewer edges than one in so many is the last one.
 constexpr uint64_t kFewOf = 500;
 
-/// Entities that one step may look at before it ends, as max_attempts is meant for vertices of few elements: a
-/// second's work or two.
+/// Entities that one step may look at before it ends, as max_attempts is meant for vertices of few elements:
+/// a second's work or two.
 constexpr uint64_t kMaxStepWork = 20'000'000;
+
+/// A phase ends when so many turns for each edge, and some more, have not brought it to an end: something
+/// goes in circles then.
+constexpr uint64_t kMostTurns = 20;
+constexpr uint64_t kMoreTurns = 20'000;
 
 /// Rounds over the worst elements at the end, as long as each finds something.
 constexpr int kMaxRounds = 4;
@@ -52,6 +57,18 @@ std::vector<Slot> Others(const Mesh& mesh, EntityKind kind) {
   return others;
 }
 
+/// The first elements of a kind that name a vertex twice.
+std::vector<Slot> Degenerates(const Mesh& mesh, EntityKind kind) {
+  std::vector<Slot> degenerates;
+  if (mesh.IsPlain()) return degenerates;
+  mesh.slots(kind).live().ForEach([&](Slot slot) {
+    const EntityId id(kind, slot);
+    const bool fits = mesh.IsElement(id) && mesh.IsDegenerate(id);
+    if (fits && degenerates.size() < kMaxIds) degenerates.push_back(slot);
+  });
+  return degenerates;
+}
+
 }  // namespace
 
 absl::string_view AdaptPhaseName(AdaptPhase phase) {
@@ -68,7 +85,10 @@ absl::Status CheckAdaptable(const Mesh& mesh) {
                : Refuse(reason::kElementInTheWay, "other elements stand beside those to be adapted", kind,
                         others);
   }
-  return absl::OkStatus();
+  const EntityKind kind = ElementKindOf(mesh);
+  const std::vector<Slot> degenerates = Degenerates(mesh, kind);
+  if (degenerates.empty()) return absl::OkStatus();
+  return Refuse(reason::kDegenerateElement, "elements name a vertex twice", kind, degenerates);
 }
 
 absl::StatusOr<std::unique_ptr<Adapter>> Adapter::Start(const Mesh& mesh, const AdaptOptions& options) {
@@ -125,13 +145,17 @@ absl::Status Adapter::Step(Mesh& mesh) {
   Operations operations(mesh, state_);
   for (uint64_t attempts = 0; attempts < state_.options.max_attempts && !done(); ++attempts) {
     if (operations.work() > kMaxStepWork) break;
-    while (work_.empty() && !done()) Advance(mesh);
+    while ((work_.empty() || GoesInCircles(mesh)) && !done()) Advance(mesh);
     if (done() || state_.result.passes != pass) break;
     DYNMESH_RETURN_IF_ERROR(current().Process(work_.Take(), operations, work_));
   }
   num_elements_ = mesh.NumElements(ElementKindOf(mesh));
   revision_ = mesh.revision() + (mesh.MakeSavepoint() != start);
   return absl::OkStatus();
+}
+
+bool Adapter::GoesInCircles(const Mesh& mesh) const {
+  return work_.num_taken() > kMostTurns * mesh.NumLive(EntityKind::kEdge) + kMoreTurns;
 }
 
 void Adapter::Advance(const Mesh& mesh) {

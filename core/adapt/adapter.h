@@ -60,6 +60,7 @@ class Adapter {
 
   absl::Status LookAgain(const Mesh& mesh);
   void Enter(AdaptPhase phase, const Mesh& mesh);
+  bool GoesInCircles(const Mesh& mesh) const;
   void Advance(const Mesh& mesh);
   void EndPass(const Mesh& mesh);
   const Phase& current() const { return *phases_[static_cast<int>(phase_)]; }

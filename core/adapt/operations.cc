@@ -16,8 +16,9 @@
 namespace dynmesh {
 namespace {
 
-/// What counts as better: so that rounding does not keep operations going.
+/// What counts as better: so that neither rounding nor flat elements keep operations going.
 constexpr double kGain = 1 + 1e-6;
+constexpr double kLeastGain = 1e-9;
 
 /// Of the mean length of a vertex's edges: steps that are not worth a change.
 constexpr double kLeastStep = 0.01;
@@ -64,7 +65,7 @@ double LeastAfter(const Mesh& mesh, const Patch& patch, const Goodness& goodness
 /// be, or some number below `enough`.
 template <typename Before, typename After>
 bool IsBetter(Before before, After after) {
-  const double needed = kGain * before();
+  const double needed = kGain * before() + kLeastGain;
   return after(needed) >= needed;
 }
 
@@ -298,7 +299,7 @@ bool Operations::Climb(VertexId v) {
     if (!place || !surface.TurnsAtMost(cos_turn(), *place)) return false;
   }
   const double now = star.LeastAt(from, state_.goodness);
-  return star.LeastAt(*place, state_.goodness) > kGain * now && MoveTo(v, *place);
+  return star.LeastAt(*place, state_.goodness) > kGain * now + kLeastGain && MoveTo(v, *place);
 }
 
 }  // namespace dynmesh

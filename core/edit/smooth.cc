@@ -20,10 +20,10 @@ VertexId OtherEnd(const Mesh& mesh, EdgeId e, VertexId v) {
   return ends[0] == v ? ends[1] : ends[0];
 }
 
-/// The sum of the area vectors of the faces that make up the surface at a vertex: those on the boundary of
-/// cells, or else elements. Each turned to the side of the first, as their own orders need not agree.
-Point NormalAt(const Mesh& mesh, VertexId v) {
-  Point sum = {0, 0, 0};
+/// Calls fn(area vector) for the faces that make up the surface at a vertex: those on the boundary of cells,
+/// or else elements. For each twice.
+template <typename Fn>
+void ForEachSurfaceFace(const Mesh& mesh, VertexId v, Fn fn) {
   for (EdgeId e : mesh.IncidentEdges(v)) {
     for (FaceId f : mesh.IncidentFaces(e)) {
       const bool of_surface = mesh.IncidentCells(f).empty() || mesh.IsOnBoundary(f);
@@ -31,11 +31,27 @@ Point NormalAt(const Mesh& mesh, VertexId v) {
       std::array<Point, kMaxFaceVertices> points;
       const auto vertices = mesh.Vertices(f);
       for (size_t k = 0; k < vertices.size(); ++k) points[k] = mesh.Position(vertices[k]);
-      const Point area = AreaVector(mesh.Type(f), absl::MakeConstSpan(points.data(), vertices.size()));
-      sum = Dot(sum, area) < 0 ? sum - area : sum + area;
+      fn(AreaVector(mesh.Type(f), absl::MakeConstSpan(points.data(), vertices.size())));
     }
   }
+}
+
+/// The sum of their area vectors, each turned to the side of the first, as their own orders need not agree.
+Point NormalAt(const Mesh& mesh, VertexId v) {
+  Point sum = {0, 0, 0};
+  ForEachSurfaceFace(mesh, v, [&](const Point& area) { sum = Dot(sum, area) < 0 ? sum - area : sum + area; });
   return sum;
+}
+
+/// Whether a face at a vertex leans away from the mean normal by more than 40 degrees: there is a sharp edge
+/// or a corner then.
+bool IsSharp(const Mesh& mesh, VertexId v, const Point& normal) {
+  constexpr double kCosine = 0.766;
+  bool sharp = false;
+  ForEachSurfaceFace(mesh, v, [&](const Point& area) {
+    sharp = sharp || std::abs(Dot(normal, area)) < kCosine * Length(normal) * Length(area);
+  });
+  return sharp;
 }
 
 /// From one neighbour along the boundary of a surface to the other; zero where there are not two.
@@ -146,12 +162,14 @@ Freedom Freedom::Along(const Mesh& mesh, VertexId v) {
   if (solid && inside) return Freedom();
   const Kind kind = solid || inside ? Kind::kPlane : Kind::kLine;
   const Point along = kind == Kind::kPlane ? NormalAt(mesh, v) : DirectionOfBoundary(mesh, v);
+  if (kind == Kind::kPlane && IsSharp(mesh, v, along)) return Freedom(Kind::kNone, {0, 0, 0});
   const double length = Length(along);
   return length > 0 ? Freedom(kind, (1 / length) * along) : Freedom();
 }
 
 Point Freedom::Restrict(const Point& step) const {
   if (kind_ == Kind::kAll) return step;
+  if (kind_ == Kind::kNone) return {0, 0, 0};
   const Point part = Dot(step, unit_) * unit_;
   return kind_ == Kind::kLine ? part : step - part;
 }

@@ -27,7 +27,8 @@ struct SmoothRule {
   /// Whether vertices on the boundary move too: towards the mean of their neighbours along the boundary.
   bool move_boundary = false;
   /// Whether vertices of surfaces and of the boundary stay in the plane across their mean normal, and those
-  /// of the boundary of a surface on the line between their neighbours: so that flat parts stay flat,
+  /// of the boundary of a surface on the line between their neighbours; those at sharp edges and corners,
+  /// where a face leans away from the mean normal by more than 40 degrees, stay. So flat parts stay flat,
   /// straight ones straight, and others do not shrink.
   bool tangential = false;
 };
@@ -51,20 +52,20 @@ absl::optional<Point> MeanOfNeighbours(const Mesh& mesh, VertexId v);
 /// The mean length of a vertex's edges; 0 without any.
 double MeanLengthOfEdges(const Mesh& mesh, VertexId v);
 
-/// The directions in which a vertex may move: all, or those along a surface, or along its boundary.
+/// The directions in which a vertex may move: all, or those along a surface, or along its boundary, or none.
 class Freedom {
  public:
   /// Everything.
   Freedom() = default;
   /// Along the surface, or the boundary of a volume, that `v` is a vertex of; else everything. On the
-  /// boundary of a surface: along it.
+  /// boundary of a surface: along it. At a sharp edge or corner: nothing.
   static Freedom Along(const Mesh& mesh, VertexId v);
 
   /// The part of a step that is permitted.
   Point Restrict(const Point& step) const;
 
  private:
-  enum class Kind { kAll, kPlane, kLine };
+  enum class Kind { kAll, kPlane, kLine, kNone };
 
   Freedom(Kind kind, const Point& unit) : kind_(kind), unit_(unit) {}
 

@@ -1,10 +1,12 @@
 #include "core/repair/fill_holes.h"
 
+#include <algorithm>
 #include <array>
 
 #include "core/edit/geometry.h"
 #include "core/edit/ring_triangulation.h"
 #include "core/mesh/error.h"
+#include "core/mesh/vector.h"
 #include "core/repair/holes.h"
 
 namespace dynmesh {
@@ -49,9 +51,20 @@ class HoleFiller {
     return status;
   }
 
+  static double SquareOfLongestEdge(const std::array<Point, 3>& points) {
+    double longest = 0;
+    for (int k = 0; k < 3; ++k) {
+      const Point edge = points[(k + 1) % 3] - points[k];
+      longest = std::max(longest, Dot(edge, edge));
+    }
+    return longest;
+  }
+
   double CostOf(const std::array<VertexId, 3>& triangle) const {
     std::array<Point, 3> points;
     for (int k = 0; k < 3; ++k) points[k] = mesh_.Position(triangle[k]);
+    if (IsFlatFace(ElementType::kTriangle, points))
+      return SquareOfLongestEdge(points);  // if nothing else will do
     const double bad = 1 - Quality(ElementType::kTriangle, points);
     return Measure(ElementType::kTriangle, points) * (1 + kWeightOfShape * bad);
   }

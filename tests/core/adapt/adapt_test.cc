@@ -261,6 +261,37 @@ TEST(AdaptTest, OtherElementsAreRefusedByTheirIds) {
   EXPECT_FALSE(GetErrorDetail(danglers)->Find("ids").empty());
 }
 
+TEST(AdaptTest, FlatElementsDoNotKeepItFromItsEnd) {
+  struct Flat {
+    std::vector<Point> points;
+    std::vector<std::vector<Slot>> triangles;
+  };
+  const Flat flats[] = {
+      {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 0}}, {{0, 1, 2}, {0, 3, 1}}},  // a vertex twice
+      {{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {1, 1, 0}, {1, -1, 0}},
+       {{0, 1, 2}, {0, 2, 3}, {0, 4, 2}}},  // in a line
+      {{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0.5, 0, 0}}, {{0, 2, 3}, {0, 1, 2}, {0, 4, 1}}}};
+  for (const Flat& flat : flats) {
+    Mesh mesh;
+    for (const Point& p : flat.points) ASSERT_TRUE(mesh.AddVertex(p).ok());
+    for (const auto& triangle : flat.triangles) Add(mesh, ElementType::kTriangle, triangle);
+    Commit(mesh);
+    const AdaptResult result = Adapt(mesh, {.target_length = 0.3, .max_passes = 3});
+    EXPECT_LE(result.passes, 3);
+    EXPECT_LT(mesh.NumElements(EntityKind::kFace), 1000u);
+  }
+}
+
+TEST(AdaptTest, ElementsThatNameAVertexTwiceAreRefusedByTheirIds) {
+  Mesh mesh = MakeMesh(4);
+  Add(mesh, ElementType::kTriangle, {0, 1, 2});
+  const EntityId degenerate = Add(mesh, ElementType::kTriangle, {0, 0, 1});
+  Commit(mesh);
+  const absl::Status refused = CheckAdaptable(mesh);
+  EXPECT_EQ(ErrorReason(refused), reason::kDegenerateElement);
+  EXPECT_EQ(GetErrorDetail(refused)->Find("ids"), std::to_string(degenerate.slot));
+}
+
 TEST(AdaptTest, OptionsThatMakeNoSenseAreRefused) {
   const double nan = std::nan("");
   Mesh mesh = GradedCube(1);

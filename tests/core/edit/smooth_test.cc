@@ -113,6 +113,27 @@ TEST(SmoothTest, TangentialMovesKeepFlatSidesFlatAndStraightEdgesStraight) {
   for (Slot v : AllVertices(mesh)) EXPECT_NEAR(mesh.Position(VertexId(v))[2], 7, 1e-12);
 }
 
+TEST(SmoothTest, TangentialMovesKeepSharpEdgesAndCornersOfSolids) {
+  for (SmoothMethod method : {SmoothMethod::kLaplacian, SmoothMethod::kGuarded, SmoothMethod::kOptimizing}) {
+    Mesh mesh = TetGrid(2, 2, 2);
+    const Mesh before = mesh.Clone();
+    const auto outside = [](const Point& p) { return p[0] < 0 || p[1] < 0 || p[2] < 0; };
+    SmoothVerticesEdit edit;
+    mesh.slots(EntityKind::kVertex).live().ForEach([&](Slot v) { edit.vertices.push_back(v); });
+    edit.rule = {.method = method, .move_boundary = true, .tangential = true};
+    edit.iterations = 3;
+    ASSERT_TRUE(ApplyBatch(mesh, {edit}, {}).ok());
+    for (Slot v : edit.vertices) {
+      EXPECT_FALSE(outside(mesh.Position(VertexId(v)))) << v;
+      int extremes = 0;
+      for (double x : before.Position(VertexId(v))) extremes += x == 0 || x == 2;
+      if (extremes >= 2) {
+        EXPECT_EQ(mesh.Position(VertexId(v)), before.Position(VertexId(v))) << v;
+      }
+    }
+  }
+}
+
 TEST(SmoothTest, GuardedAndOptimizingNeverLowerTheLeastQuality) {
   for (SmoothMethod method : {SmoothMethod::kGuarded, SmoothMethod::kOptimizing}) {
     for (uint32_t seed = 1; seed <= 5; ++seed) {

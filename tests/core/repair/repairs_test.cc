@@ -360,6 +360,27 @@ TEST(FillHolesTest, ACubeWithAMissingSideIsClosedAndFacesOutwards) {
   EXPECT_DOUBLE_EQ(Enclosed(mesh), 6);
 }
 
+TEST(FillHolesTest, OfFillingsOfOneAreaTheOneWithoutFlatTriangles) {
+  Mesh mesh;
+  constexpr Slot kSide = 5;  // vertices; the hole has collinear ones on each side
+  for (Slot i = 0; i < kSide * kSide; ++i) {
+    ASSERT_TRUE(mesh.AddVertex({double(i % kSide), double(i / kSide), 0}).ok());
+  }
+  for (Slot row = 0; row + 1 < kSide; ++row) {
+    for (Slot column = 0; column + 1 < kSide; ++column) {
+      if ((row == 1 || row == 2) && (column == 1 || column == 2)) continue;
+      const Slot low = row * kSide + column, high = low + kSide;
+      Add(mesh, ElementType::kTriangle, {low, low + 1, high});
+      Add(mesh, ElementType::kTriangle, {low + 1, high + 1, high});
+    }
+  }
+  Commit(mesh);
+  const RepairReport report = Repair(mesh, FillHolesStep{8});
+  EXPECT_EQ(report.Count(RepairFinding::kFilled), 1u);
+  EXPECT_DOUBLE_EQ(TotalMeasure(mesh, EntityKind::kFace), 16);
+  EXPECT_EQ(Repair(mesh, RemoveDuplicatesStep{}).Count(RepairFinding::kDegenerate), 0u);
+}
+
 /// A plane ring of 2 * n triangles between radius 1 and 2; concave star if `inner` alternates.
 Mesh Annulus(int n, double inner_low) {
   Mesh mesh;

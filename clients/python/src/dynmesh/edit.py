@@ -337,7 +337,7 @@ class EditBatch:
             Vertices on the boundary move too, towards their neighbours along it.
         tangential : bool
             Vertices of surfaces and of the boundary stay in the plane across their mean normal, and those of the
-            boundary of a surface on the line between their neighbours.
+            boundary of a surface on the line between their neighbours; those at sharp edges and corners stay.
         allow_inversion, min_quality
             As of `split_edges`.
         """

@@ -356,7 +356,8 @@ class Session(SessionChecks):
     ) -> HistoryResult:
         """Takes the last `count` batches back, whoever sent them, all or nothing, as one new revision.
 
-        Ids, positions and attributes are as before the batches; columns that they added stay, without their rows.
+        Ids, positions and attributes are as before the batches; columns that they added stay, without their rows. Batches that changed
+        nothing made a revision, but do not count.
         `SessionInfo.undoable_batches` says how many there are: 100 unless the server is told otherwise, fewer when
         they are large. A repair is a batch, too; an import cannot be undone.
 
