@@ -264,17 +264,23 @@ TEST(AdaptTest, OtherElementsAreRefusedByTheirIds) {
 TEST(AdaptTest, FlatElementsDoNotKeepItFromItsEnd) {
   struct Flat {
     std::vector<Point> points;
-    std::vector<std::vector<Slot>> triangles;
+    std::vector<std::array<VertexId, 3>> triangles;
+  };
+  const auto triangle = [](Slot a, Slot b, Slot c) {
+    return std::array<VertexId, 3>{VertexId(a), VertexId(b), VertexId(c)};
   };
   const Flat flats[] = {
-      {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 0}}, {{0, 1, 2}, {0, 3, 1}}},  // a vertex twice
+      {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 0}}, {triangle(0, 1, 2), triangle(0, 3, 1)}},
       {{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {1, 1, 0}, {1, -1, 0}},
-       {{0, 1, 2}, {0, 2, 3}, {0, 4, 2}}},  // in a line
-      {{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0.5, 0, 0}}, {{0, 2, 3}, {0, 1, 2}, {0, 4, 1}}}};
+       {triangle(0, 1, 2), triangle(0, 2, 3), triangle(0, 4, 2)}},
+      {{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0.5, 0, 0}},
+       {triangle(0, 2, 3), triangle(0, 1, 2), triangle(0, 4, 1)}}};
   for (const Flat& flat : flats) {
     Mesh mesh;
     for (const Point& p : flat.points) ASSERT_TRUE(mesh.AddVertex(p).ok());
-    for (const auto& triangle : flat.triangles) Add(mesh, ElementType::kTriangle, triangle);
+    for (const auto& corners : flat.triangles) {
+      ASSERT_TRUE(mesh.AddElement(ElementType::kTriangle, corners).ok());
+    }
     Commit(mesh);
     const AdaptResult result = Adapt(mesh, {.target_length = 0.3, .max_passes = 3});
     EXPECT_LE(result.passes, 3);
@@ -283,7 +289,8 @@ TEST(AdaptTest, FlatElementsDoNotKeepItFromItsEnd) {
 }
 
 TEST(AdaptTest, ElementsThatNameAVertexTwiceAreRefusedByTheirIds) {
-  Mesh mesh = MakeMesh(4);
+  Mesh mesh;
+  AddVertices(mesh, 3);
   Add(mesh, ElementType::kTriangle, {0, 1, 2});
   const EntityId degenerate = Add(mesh, ElementType::kTriangle, {0, 0, 1});
   Commit(mesh);
