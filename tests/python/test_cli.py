@@ -60,6 +60,7 @@ def test_operators_change_what_is_named_and_a_dry_run_tells(run, mesh_file):
     assert [refusal["reason"] for refusal in skipped["refusals"]] == ["BOUNDARY", "UNKNOWN_ENTITY"]
     assert "item 1: UNKNOWN_ENTITY" in run("swap", "ops", *places, "--skip-refused").stdout
     assert run("collapse", "ops", "--ends", 0, 5, "--at", "0").stdout.startswith("revision 6: 5 vertices")
+    assert run("rm", "ops", "--yes").returncode == 0
 
 
 def test_elements_are_split_and_vertices_dissolved(run, mesh_file):
@@ -67,6 +68,7 @@ def test_elements_are_split_and_vertices_dissolved(run, mesh_file):
     split = json.loads(run("split", "parts", "0", "--kind", "cell", "--json").stdout)
     assert (split["new_vertices"], split["counts"]["cells"]) == ([5], 5)
     assert run("dissolve", "parts", 5).stdout.startswith("revision 3: 5 vertices")
+    assert run("rm", "parts", "--yes").returncode == 0
 
 
 def test_operators_whose_names_make_no_sense_are_wrong_usage(run):
