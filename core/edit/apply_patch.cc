@@ -1,6 +1,5 @@
 #include "core/edit/apply_patch.h"
 
-
 #include "absl/container/inlined_vector.h"
 #include "absl/strings/str_cat.h"
 #include "core/edit/derived_rows.h"

@@ -19,8 +19,7 @@ namespace dynmesh {
 ///
 ///     cut a-b at m          the halves of the edge take its row, the parts of a face at it that face's
 ///     `gone` becomes `kept` an edge or face of `gone` passes its row on to the one with `kept`; where that
-///     was
-///                           there already, the policy chooses, and it has all the weight
+///                           was there already, the policy chooses, and it has all the weight
 ///
 /// Nothing is looked for where the mesh has no column of edges or of faces.
 class DerivedRows {

@@ -177,17 +177,19 @@ double Quality(ElementType type, absl::Span<const Point> p) {
 double SmallestDihedralAngle(absl::Span<const Point> p) {
   const ElementTemplate& shape = TemplateOf(ElementType::kTetrahedron);
   std::array<Point, 4> normals;
+  std::array<double, 4> lengths;
   for (int i = 0; i < 4; ++i) {
     const auto& v = shape.faces[i].vertices;
     normals[i] = Cross(p[v[1]] - p[v[0]], p[v[2]] - p[v[0]]);
+    lengths[i] = Length(normals[i]);
   }
   // Which angle is smallest the cosines tell, which are cheap; how small, only the arc tangent tells exactly.
   double largest = -std::numeric_limits<double>::infinity();
   int first = 0, second = 1;
   for (int i = 0; i < 4; ++i) {
     for (int j = i + 1; j < 4; ++j) {
-      const double squares = Dot(normals[i], normals[i]) * Dot(normals[j], normals[j]);
-      const double cosine = squares > 0 ? -Dot(normals[i], normals[j]) / std::sqrt(squares) : 1;
+      const double product = lengths[i] * lengths[j];
+      const double cosine = product > 0 ? -Dot(normals[i], normals[j]) / product : 1;
       if (cosine <= largest) continue;
       largest = cosine;
       first = i;

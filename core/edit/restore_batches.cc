@@ -37,13 +37,8 @@ absl::StatusOr<RestoredBatches> RestoreBatches(Mesh& mesh, absl::Span<const Batc
   const BatchImage::Fit now = mesh.FitNow();
   result.checksum = now.checksum;
   result.counts = now.num_live;
-  if (options.dry_run) {
-    result.images.clear();
-    mesh.Rollback();
-  } else if (const absl::Status committed = mesh.Commit(); !committed.ok()) {
-    mesh.Rollback();
-    return committed;
-  }
+  if (options.dry_run) result.images.clear();
+  DYNMESH_RETURN_IF_ERROR(EndBatch(mesh, options.dry_run ? BatchEnding::kRollBack : BatchEnding::kCommit));
   result.revision = mesh.revision();
   return result;
 }

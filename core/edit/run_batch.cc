@@ -33,6 +33,12 @@ absl::Status RunInBatch(Mesh& mesh, absl::FunctionRef<absl::Status()> fn) {
   return status;
 }
 
+absl::Status EndBatch(Mesh& mesh, BatchEnding ending) {
+  const absl::Status ended = ending == BatchEnding::kCommit ? mesh.Commit() : absl::OkStatus();
+  if (ending == BatchEnding::kRollBack || !ended.ok()) mesh.Rollback();
+  return ended;
+}
+
 void PutBackTo(Mesh& mesh, Mesh::Savepoint savepoint) try {
   mesh.RollbackTo(savepoint);
 } catch (const std::bad_alloc&) {

@@ -13,6 +13,12 @@ namespace dynmesh {
 /// REQUIRES: no batch is open.
 absl::Status RunInBatch(Mesh& mesh, absl::FunctionRef<absl::Status()> fn);
 
+/// What becomes of a batch.
+enum class BatchEnding { kCommit, kRollBack };
+
+/// Ends the open batch; one that cannot be committed is rolled back. Errors: those of Mesh::Commit.
+absl::Status EndBatch(Mesh& mesh, BatchEnding ending);
+
 /// Mesh::RollbackTo within fn() of RunInBatch. Memory that runs out here leaves a mesh that nobody can put
 /// back: no refusal, but std::runtime_error.
 void PutBackTo(Mesh& mesh, Mesh::Savepoint savepoint);

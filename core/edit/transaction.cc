@@ -236,12 +236,8 @@ absl::StatusOr<BatchResult> ApplyBatch(Mesh& mesh, absl::Span<const Edit> edits,
   if (!applied.ok()) return applied;
   result.checksum = mesh.checksum();
   for (EntityKind kind : kEntityKinds) result.counts[Dimension(kind)] = mesh.NumLive(kind);
-  if (options.dry_run || edits.empty()) {
-    mesh.Rollback();
-  } else if (const absl::Status committed = mesh.Commit(); !committed.ok()) {
-    mesh.Rollback();
-    return committed;
-  }
+  const bool leaves_no_trace = options.dry_run || edits.empty();
+  DYNMESH_RETURN_IF_ERROR(EndBatch(mesh, leaves_no_trace ? BatchEnding::kRollBack : BatchEnding::kCommit));
   result.revision = mesh.revision();
   return result;
 }

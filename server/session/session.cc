@@ -11,7 +11,6 @@
 #include "absl/strings/str_cat.h"
 #include "absl/time/clock.h"
 #include "core/check/neighborhood_check.h"
-#include "core/edit/run_batch.h"
 #include "core/mesh/error.h"
 #include "server/session/catch_exceptions.h"
 #include "server/session/fingerprint.h"
@@ -266,11 +265,8 @@ absl::StatusOr<BatchEnding> Session::EditLocked(absl::FunctionRef<absl::StatusOr
     return wanted.status();
   };
   DYNMESH_RETURN_IF_ERROR(RunEdit([&] {
-    absl::Status status = RunInBatch(mesh_, edit_and_note);
-    if (!status.ok()) return status;
-    if (*wanted == BatchEnding::kCommit) status = mesh_.Commit();
-    if (*wanted == BatchEnding::kRollBack || !status.ok()) mesh_.Rollback();
-    return status;
+    const absl::Status status = RunInBatch(mesh_, edit_and_note);
+    return status.ok() ? EndBatch(mesh_, *wanted) : status;
   }));
   items_since_check_ = kItemsBetweenChecks;
   if (*wanted == BatchEnding::kRollBack) return wanted;

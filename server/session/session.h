@@ -16,6 +16,7 @@
 #include "absl/time/time.h"
 #include "absl/types/optional.h"
 #include "absl/types/span.h"
+#include "core/edit/run_batch.h"
 #include "core/edit/transaction.h"
 #include "core/mesh/mesh.h"
 #include "server/session/access_queue.h"
@@ -76,9 +77,6 @@ struct ImportOutcome;
 
 /// The same of a repair.
 struct RepairOutcome;
-
-/// What becomes of a batch.
-enum class BatchEnding { kCommit, kRollBack };
 
 /// INVALID_ARGUMENT BAD_SESSION_NAME unless `name` is 1-64 of [A-Za-z0-9_.-] and starts with a letter or
 /// digit.

@@ -72,7 +72,8 @@ def test_elements_are_split_and_vertices_dissolved(run, mesh_file):
 
 
 def test_operators_whose_names_make_no_sense_are_wrong_usage(run):
-    for arguments in (("--ends", 1), ("--ends", 1, 2, "--kind", "cell"), ("--ends", 1, 2, "--faces"), ()):
+    ends, at = ("--ends", 1, 2), ("--at", "0.5")
+    for arguments in (("--ends", 1), (*ends, "--kind", "cell"), (1, *at, "--kind", "cell"), (*ends, "--faces"), ()):
         assert run("split" if "--faces" not in arguments else "swap", "none", *arguments).returncode == 2
 
 

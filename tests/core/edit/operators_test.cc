@@ -15,6 +15,7 @@
 #include "core/edit/geometry.h"
 #include "core/edit/split.h"
 #include "core/edit/swap.h"
+#include "tests/support/measures.h"
 #include "tests/support/meshes.h"
 #include "tests/support/oracle.h"
 
@@ -45,11 +46,6 @@ int NumInverted(const Mesh& mesh) {
     inverted += Orientation(mesh.Type(CellId(c)), points) != 1;
   });
   return inverted;
-}
-
-int64_t Euler(const Mesh& mesh) {
-  return int64_t{mesh.NumLive(EntityKind::kVertex)} - mesh.NumLive(EntityKind::kEdge) +
-         mesh.NumLive(EntityKind::kFace) - mesh.NumLive(EntityKind::kCell);
 }
 
 absl::Status Carry(Mesh& mesh, const Plan& plan, EntityId id, const PatchLimits& limits = {}) {

@@ -17,6 +17,7 @@
 #include "core/edit/split.h"
 #include "core/mesh/vector.h"
 #include "tests/support/meshes.h"
+#include "tests/support/measures.h"
 #include "tests/support/oracle.h"
 
 namespace dynmesh::testing {
@@ -39,23 +40,6 @@ std::string ReasonAt(Mesh& mesh, Slot v) {
   mesh.Rollback();
   EXPECT_EQ(Describe(mesh), before);
   return reason;
-}
-
-int64_t Euler(const Mesh& mesh) {
-  return int64_t{mesh.NumLive(EntityKind::kVertex)} - mesh.NumLive(EntityKind::kEdge) +
-         mesh.NumLive(EntityKind::kFace) - mesh.NumLive(EntityKind::kCell);
-}
-
-double TotalMeasure(const Mesh& mesh, EntityKind kind) {
-  double total = 0;
-  mesh.slots(kind).live().ForEach([&](Slot slot) {
-    const EntityId id{kind, slot};
-    if (!mesh.IsElement(id)) return;
-    std::vector<Point> points;
-    for (VertexId v : mesh.VerticesOf(id)) points.push_back(mesh.Position(v));
-    total += Measure(mesh.Type(id), points);
-  });
-  return total;
 }
 
 /// n * n squares of two triangles each, in the plane z = 0.

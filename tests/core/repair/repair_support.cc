@@ -79,11 +79,6 @@ std::vector<EntityId> Found(const RepairReport& report, RepairFinding finding) {
   return report.Of(finding).entities;
 }
 
-int64_t Euler(const Mesh& mesh) {
-  return int64_t{mesh.NumLive(EntityKind::kVertex)} - mesh.NumLive(EntityKind::kEdge) +
-         mesh.NumLive(EntityKind::kFace) - mesh.NumLive(EntityKind::kCell);
-}
-
 int CountTurns(const Mesh& mesh) {
   std::map<std::vector<VertexId>, std::vector<std::vector<VertexId>>> sides;  // cycles by sorted vertices
   const auto add = [&](std::vector<VertexId> cycle) {
@@ -106,17 +101,6 @@ int CountTurns(const Mesh& mesh) {
   int turns = 0;
   for (const auto& [key, cycles] : sides) turns += cycles.size() == 2 && cycles[0] == cycles[1];
   return turns;
-}
-
-double TotalMeasure(const Mesh& mesh, EntityKind kind) {
-  double total = 0;
-  for (EntityId id : ElementsOf(mesh)) {
-    if (id.kind != kind) continue;
-    std::vector<Point> points;
-    for (VertexId v : mesh.VerticesOf(id)) points.push_back(mesh.Position(v));
-    total += Measure(mesh.Type(id), points);
-  }
-  return total;
 }
 
 Mesh Triangles(std::initializer_list<Point> points, std::initializer_list<std::array<Slot, 3>> triangles) {

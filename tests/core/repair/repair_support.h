@@ -6,6 +6,7 @@
 #include <random>
 
 #include "core/repair/repair.h"
+#include "tests/support/measures.h"
 #include "tests/support/meshes.h"
 
 namespace dynmesh::testing {
@@ -17,14 +18,8 @@ RepairReport Repair(Mesh& mesh, const RepairStep& step);
 /// The entities of a finding.
 std::vector<EntityId> Found(const RepairReport& report, RepairFinding finding);
 
-/// Vertices - edges + faces - cells.
-int64_t Euler(const Mesh& mesh);
-
 /// Pairs of faces that turn differently across an edge that just these two have, and of cells across a face.
 int CountTurns(const Mesh& mesh);
-
-/// Lengths, areas or signed volumes of the elements of a kind.
-double TotalMeasure(const Mesh& mesh, EntityKind kind);
 
 /// A mesh of triangles at the given points.
 Mesh Triangles(std::initializer_list<Point> points, std::initializer_list<std::array<Slot, 3>> triangles);

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import uuid
 from collections.abc import Callable, Collection, Iterable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import grpc
 from google.protobuf import field_mask_pb2
 from numpy.typing import ArrayLike
 
 from ._calls import Caller
-from .adapt import AdaptProgress, AdaptResult, adapt_request, read_adaptation
 from .arrays import as_int64
 from .delta import HAS_NATIVE
 from .edit import EditBatch, Transaction
-from .edit_result import EditResult, HistoryResult, history_from_proto
+from .edit_result import EditResult
 from .edit_stream import EditStream
 from .errors import InvalidArgumentError, UnimplementedError
 from .files import PathLike, read_mesh
@@ -25,20 +23,10 @@ from .mirror import Mirror, Update
 from .mirror_state import MirrorState
 from .progress import Progress
 from .relations import RelationLike, relations_to_proto
-from .repairs import RepairResult, RepairStep, choose_steps, read_repair
-from .session_checks import SessionChecks
+from .session_changes import SessionChanges, new_request_id
 from .session_reader import FOREVER
 from .transfer import ImportResult, import_requests, read_import
-from .v1 import (
-    adapt_pb2_grpc,
-    edits_pb2,
-    edits_pb2_grpc,
-    repairs_pb2,
-    repairs_pb2_grpc,
-    sessions_pb2,
-    subscriptions_pb2,
-    subscriptions_pb2_grpc,
-)
+from .v1 import edits_pb2, sessions_pb2, subscriptions_pb2, subscriptions_pb2_grpc
 
 if TYPE_CHECKING:
     import meshio
@@ -58,7 +46,7 @@ _CODECS = {
 }
 
 
-class Session(SessionChecks):
+class Session(SessionChanges):
     """A session by its name; made by `Client.session` and `Client.create_session`.
 
     Costs nothing to make and holds nothing of the mesh: each method is a call. ``timeout`` is in seconds;
@@ -68,9 +56,6 @@ class Session(SessionChecks):
 
     def __init__(self, name: str, channel: grpc.Channel, caller: Caller) -> None:
         super().__init__(name, channel, caller)
-        self._adapt = adapt_pb2_grpc.AdaptServiceStub(channel)
-        self._edits = edits_pb2_grpc.EditServiceStub(channel)
-        self._repairs = repairs_pb2_grpc.RepairServiceStub(channel)
         self._subscriptions = subscriptions_pb2_grpc.SubscriptionServiceStub(channel)
 
     def __repr__(self) -> str:
@@ -174,7 +159,7 @@ class Session(SessionChecks):
         header = sessions_pb2.ImportHeader(
             session=self.name,
             validate_only=validate_only,
-            request_id=_new_request_id(),
+            request_id=new_request_id(),
             slot_order=_SLOT_ORDERS[slot_order],
         )
         requests = import_requests(header, data)
@@ -254,7 +239,7 @@ class Session(SessionChecks):
             edits=batch.edits(),
             as_of_revision=as_int64(as_of_revision, "as_of_revision"),
             if_revision=None if if_revision is None else as_int64(if_revision, "if_revision"),
-            request_id=request_id or _new_request_id(),
+            request_id=request_id or new_request_id(),
             validate_only=validate_only,
             skip_refused=skip_refused,
             report_lineage=report_lineage,
@@ -280,183 +265,13 @@ class Session(SessionChecks):
                 session=self.name,
                 edits=batch.edits(),
                 as_of_revision=read_at,
-                request_id=_new_request_id(),
+                request_id=new_request_id(),
                 skip_refused=skip_refused,
                 report_lineage=report_lineage,
                 conflict_policy=policy,
             )
 
         return EditStream(self._edits.StreamEdits, make_request, window, self._caller.check_size)
-
-    def repair(
-        self,
-        steps: Iterable[RepairStep] = (),
-        *,
-        weld: float | None = None,
-        remove_duplicates: bool = False,
-        split_non_manifold: bool = False,
-        orient: bool = False,
-        fill_holes: int | None = None,
-        if_revision: int | None = None,
-        request_id: str | None = None,
-        validate_only: bool = False,
-        progress: bool | None = None,
-        timeout: float | None = None,
-    ) -> RepairResult:
-        """Repairs the mesh as one revision, all or nothing; without one where nothing has to be changed.
-
-        Nobody else can edit the session meanwhile. An interruption ends it without a change.
-
-        Parameters
-        ----------
-        steps : iterable of Orient, Weld, RemoveDuplicates, SplitNonManifold, FillHoles
-            From `dynmesh.repairs`: taken in this order, each on what the one before left.
-        weld : float, optional
-        remove_duplicates, split_non_manifold, orient : bool
-        fill_holes : int, optional
-            Instead of `steps`: those that are named, with their defaults, in this order, and `orient` once more
-            after holes were filled, as surfaces that are closed can be made to face outwards.
-        if_revision, request_id, validate_only
-            As in `edit`.
-        timeout : float, optional
-            Default: none, as it takes as long as it takes.
-
-        Examples
-        --------
-        >>> result = session.repair(weld=1e-6, split_non_manifold=True, orient=True, fill_holes=20)
-        >>> result.count("merged"), result.steps[2].findings["not_orientable"].ids
-        """
-        chosen = choose_steps(
-            steps,
-            weld=weld,
-            remove_duplicates=remove_duplicates,
-            split_non_manifold=split_non_manifold,
-            orient=orient,
-            fill_holes=fill_holes,
-        )
-        request = repairs_pb2.RepairSessionRequest(
-            session=self.name,
-            steps=[step.to_proto() for step in chosen],
-            if_revision=None if if_revision is None else as_int64(if_revision, "if_revision"),
-            request_id=request_id or _new_request_id(),
-            validate_only=validate_only,
-        )
-        seconds = FOREVER if timeout is None else timeout
-        with Progress("repairing", progress) as bar:
-            return read_repair(self._caller.stream(self._repairs.RepairSession, request, seconds), chosen, bar)
-
-    def undo(
-        self,
-        count: int = 1,
-        *,
-        if_revision: int | None = None,
-        request_id: str | None = None,
-        validate_only: bool = False,
-        timeout: float | None = None,
-    ) -> HistoryResult:
-        """Takes the last `count` batches back, whoever sent them, all or nothing, as one new revision.
-
-        Ids, positions and attributes are as before the batches; columns that they added stay, without their rows. Batches that changed
-        nothing made a revision, but do not count.
-        `SessionInfo.undoable_batches` says how many there are: 100 unless the server is told otherwise, fewer when
-        they are large. A repair is a batch, too; an import cannot be undone.
-
-        Parameters
-        ----------
-        if_revision, request_id, validate_only
-            As in `edit`. ``if_revision`` makes sure that nobody's batch came last but the one that is meant.
-
-        Raises
-        ------
-        FailedPreconditionError
-            NOTHING_TO_UNDO: there are fewer than `count`. Nothing is undone then.
-        """
-        request = edits_pb2.UndoEditsRequest(
-            **self._history_fields(count, if_revision, request_id), validate_only=validate_only
-        )
-        return history_from_proto(self._caller.unary(self._edits.UndoEdits, request, timeout, repeatable=True))
-
-    def redo(
-        self,
-        count: int = 1,
-        *,
-        if_revision: int | None = None,
-        request_id: str | None = None,
-        validate_only: bool = False,
-        timeout: float | None = None,
-    ) -> HistoryResult:
-        """Does again the `count` batches that `undo` took back last, as one new revision.
-
-        A new batch ends it. Parameters as in `undo`; `FailedPreconditionError` NOTHING_TO_REDO.
-        """
-        request = edits_pb2.RedoEditsRequest(
-            **self._history_fields(count, if_revision, request_id), validate_only=validate_only
-        )
-        return history_from_proto(self._caller.unary(self._edits.RedoEdits, request, timeout, repeatable=True))
-
-    def _history_fields(self, count: int, if_revision: int | None, request_id: str | None) -> dict[str, Any]:
-        return {
-            "session": self.name,
-            "count": _count(count),
-            "if_revision": None if if_revision is None else as_int64(if_revision, "if_revision"),
-            "request_id": request_id or _new_request_id(),
-        }
-
-    def adapt(
-        self,
-        target_length: float | None = None,
-        *,
-        size_attribute: str | None = None,
-        min_quality: float = 0.3,
-        feature_angle: float = 40.0,
-        max_passes: int = 10,
-        max_elements: int | None = None,
-        progress: bool | Callable[[AdaptProgress], None] | None = None,
-        timeout: float | None = None,
-    ) -> AdaptResult:
-        """Brings a mesh of triangles or of tetrahedra to a target edge length and quality.
-
-        By splits, collapses, swaps and moves, in passes. Kept are the topology, the orientation of elements, sharp
-        edges and corners with their places, and the form of surfaces up to half of `feature_angle`; and no angle
-        gets smaller than the smallest one at the start, or than 12 degrees. Making a curved surface many times
-        coarser loses volume, as deviations add up. Each pass is a revision, or several:
-        others can edit in between, and mirrors follow. When this is interrupted, what was done until then stays.
-
-        Parameters
-        ----------
-        target_length : float
-            Of edges, in units of the positions. Edges from 4/5 to 4/3 of it are left alone.
-        size_attribute : str, optional
-            In its place: the vertex attribute (one float64 or float32) that holds it.
-        min_quality : float
-            Elements below it are worked on, 0 to 1 (regular): the smaller of the mean ratio and of the smallest
-            angle over that of the regular element.
-        feature_angle : float
-            Degrees: an edge of a surface whose faces deviate from one plane by more is kept.
-        max_passes : int
-        max_elements : int, optional
-            No more splits when there are so many.
-        progress : bool or callable, optional
-            Whether to show a bar (default: on a terminal); or what is called with each `AdaptProgress`.
-        timeout : float, optional
-            Default: none, as it takes as long as it takes.
-
-        Raises
-        ------
-        FailedPreconditionError
-            NOT_SIMPLEX or ELEMENT_IN_THE_WAY: ``error.ids`` are other elements.
-        InvalidArgumentError
-            ``metadata["field"]`` makes no sense.
-        """
-        request = adapt_request(
-            self.name, target_length, size_attribute, min_quality, feature_angle, max_passes, max_elements
-        )
-        listen = progress if callable(progress) else None
-        with Progress("adapting", False if callable(progress) else progress) as bar:
-            replies = self._caller.stream(
-                self._adapt.AdaptSession, request, FOREVER if timeout is None else timeout
-            )
-            return read_adaptation(replies, bar, listen)
 
     # ---- Following ----
 
@@ -496,10 +311,6 @@ class Session(SessionChecks):
         return Mirror(self._subscriptions.Subscribe, request, state, on_delta)
 
 
-def _new_request_id() -> str:
-    return uuid.uuid4().hex
-
-
 def _conflict_policy(name: str) -> int:
     if name in _CONFLICT_POLICIES:
         return _CONFLICT_POLICIES[name]
@@ -507,14 +318,6 @@ def _conflict_policy(name: str) -> int:
         f'conflict_policy is "ignore" or "touched", not {name!r}',
         reason="BAD_ARGUMENT",
         metadata={"field": "conflict_policy"},
-    )
-
-
-def _count(value: int) -> int:
-    if 1 <= as_int64(value, "count") < 2**32:
-        return int(value)
-    raise InvalidArgumentError(
-        f"count is at least 1, not {value}", reason="BAD_ARGUMENT", metadata={"field": "count"}
     )
 
 

@@ -77,7 +77,7 @@ class SessionChecks(SessionReader):
         progress: bool | None = None,
         timeout: float | None = None,
     ) -> CheckReport:
-        """Checks the session at its present revision. Takes about a microsecond an entity with all checks.
+        """Checks the session at its present revision. Takes a few microseconds an entity with all checks.
 
         Parameters
         ----------
