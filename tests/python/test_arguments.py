@@ -139,3 +139,89 @@ def test_an_interval_that_is_none_is_refused(session, options):
         session.mirror(**options)
     with pytest.raises(dynmesh.InvalidArgumentError, match="position_bits"):
         session.mirror(position_bits=2**40)
+
+
+ODD_ARGUMENTS = {
+    "name": lambda s, c: c.create_session(5),
+    "name ": lambda s, c: c.session(None),
+    "name  ": lambda s, c: c.delete_session(["a"]),
+    "duplicates": lambda s, c: c.create_session("odd", duplicates=[]),
+    "checks": lambda s, c: c.create_session("odd", checks=None),
+    "stored_relations": lambda s, c: c.create_session("odd", stored_relations=None),
+    "request_id": lambda s, c: c.create_session("odd", request_id=5),
+    "checks ": lambda s, c: s.set_checks(None),
+    "checks  ": lambda s, c: s.set_checks(["inverted"]),
+    "checks   ": lambda s, c: s.check(5),
+    "checks    ": lambda s, c: s.check([["inverted"]]),
+    "etag": lambda s, c: s.set_checks({}, etag=5),
+    "etag ": lambda s, c: s.delete(etag=None),
+    "stored_relations ": lambda s, c: s.store_relations([5]),
+    "steps": lambda s, c: s.repair(None),
+    "steps ": lambda s, c: s.repair(["orient"]),
+    "weld": lambda s, c: s.repair(weld="wide"),
+    "batch": lambda s, c: s.apply(None),
+    "batch ": lambda s, c: s.edit_stream().submit(None),
+    "request_id ": lambda s, c: s.apply(EditBatch(), request_id=5),
+    "if_revision": lambda s, c: s.undo(if_revision="1"),
+    "conflict_policy": lambda s, c: s.apply(EditBatch(), conflict_policy=[]),
+    "window": lambda s, c: s.edit_stream(window=0),
+    "slot_order": lambda s, c: s.import_mesh(TET, {}, slot_order=[]),
+    "cells": lambda s, c: s.import_mesh(TET, 5),
+    "cells ": lambda s, c: s.import_mesh(TET, [5]),
+    "size_attribute": lambda s, c: s.adapt(size_attribute=5),
+    "path": lambda s, c: s.export(5),
+    "position_bits": lambda s, c: s.boundary_surface("14"),
+    "codec": lambda s, c: s.mirror(codec=[]),
+    "min_interval": lambda s, c: s.mirror(min_interval="1"),
+    "from_mirror": lambda s, c: s.mirror(from_mirror=s),
+    "on_delta": lambda s, c: s.mirror(on_delta=5),
+    "method": lambda s, c: EditBatch().smooth_vertices([0], method=[]),
+    "name   ": lambda s, c: EditBatch().add_attribute(5, "cell"),
+    "components": lambda s, c: EditBatch().add_attribute("heat", "cell", components=0),
+    "heat": lambda s, c: EditBatch().add_attribute("heat", "cell", "real"),
+    "default": lambda s, c: EditBatch().add_attribute("heat", "cell", default=[[1], [1, 2]]),
+    "values": lambda s, c: EditBatch().set_attribute("heat", "cell", [0, 1], [[1], [1, 2]]),
+    "timeout": lambda s, c: dynmesh.connect(timeout="soon"),
+    "retries": lambda s, c: dynmesh.connect(retries=-1),
+    "read_ahead_bytes": lambda s, c: dynmesh.connect(read_ahead_bytes="1"),
+    "target": lambda s, c: dynmesh.connect(5),
+}
+
+
+@pytest.mark.parametrize("what", ODD_ARGUMENTS)
+def test_an_odd_argument_is_named(session, client, what):
+    with pytest.raises(dynmesh.InvalidArgumentError) as caught:
+        ODD_ARGUMENTS[what](session, client)
+    assert what.strip() in (caught.value.metadata["field"], caught.value.metadata.get("attribute"))
+    assert session.revision == 0
+
+
+@pytest.mark.parametrize("timeout", ["1", 0, -1.0, np.nan, True, [1], 10**400])
+def test_an_odd_timeout_is_refused_by_every_kind_of_call(session, timeout):
+    calls = (session.info, session.snapshot, session.validate, session.check, session.undo)
+    for call in (*calls, lambda timeout: session.import_mesh(TET, {}, timeout=timeout)):
+        with pytest.raises(dynmesh.InvalidArgumentError, match="timeout"):
+            call(timeout=timeout)
+
+
+@pytest.mark.parametrize("timeout", [1e300, np.float32(30), 30, np.inf])
+def test_a_timeout_may_be_any_positive_number(session, timeout):
+    assert session.info(timeout=timeout).revision == 0
+    with session.mirror() as mirror:
+        assert mirror.wait(0, timeout=timeout) == 0
+
+
+@pytest.mark.parametrize("ids", [slice("a", 3), slice(0.5, 3), slice(0, "b"), slice(0, 3, "c"), slice(0, 2**70)])
+def test_odd_slices_are_refused(session, ids):
+    with pytest.raises(dynmesh.InvalidArgumentError, match="of ids"):
+        session.positions(ids)
+
+
+def test_handles_of_new_vertices_are_no_ids_of_queries(session):
+    with session.edit() as tx:
+        handles = tx.add_vertices(TET)
+    for ask in (session.positions, lambda ids: session.neighbors("vertex", "edge", ids)):
+        with pytest.raises(dynmesh.InvalidArgumentError) as caught:
+            ask([0, handles[1]])
+        assert caught.value.reason == "FOREIGN_HANDLE" and caught.value.metadata["index"] == "1"
+    assert (session.positions(tx.result.resolve(handles)) == TET).all()

@@ -1,7 +1,9 @@
-"""The command, as a shell sees it."""
+"""The command: in a process of its own, as a shell sees it, where that matters, else within this one."""
 
 from __future__ import annotations
 
+import contextlib
+import io
 import json
 import os
 import signal
@@ -11,6 +13,7 @@ import sys
 import meshio
 import numpy as np
 import pytest
+from dynmesh.cli import main
 from shapes import bow_tie, two_tets, zoo
 
 COMMAND = (
@@ -19,8 +22,25 @@ COMMAND = (
 
 
 @pytest.fixture
-def run(daemon):
-    """Runs a command to its end and gives its exit code, stdout and stderr."""
+def run(daemon, monkeypatch):
+    """Runs a command within this process, and gives its exit code, stdout and stderr."""
+
+    def call(*args: object, target: str = daemon.target) -> subprocess.CompletedProcess[str]:
+        monkeypatch.setenv("DYNMESH_TARGET", target)
+        stdout, stderr = io.StringIO(), io.StringIO()
+        with contextlib.redirect_stdout(stdout), contextlib.redirect_stderr(stderr):
+            try:
+                code = main([*map(str, args)])
+            except SystemExit as ended:  # help, or wrong usage
+                code = ended.code
+        return subprocess.CompletedProcess(args, code, stdout.getvalue(), stderr.getvalue())
+
+    return call
+
+
+@pytest.fixture
+def shell(daemon):
+    """The same in a process of its own."""
 
     def call(*args: object, target: str = daemon.target) -> subprocess.CompletedProcess[str]:
         environment = {**os.environ, "DYNMESH_TARGET": target}
@@ -94,18 +114,18 @@ def test_a_repair_tells_what_it_did_and_a_dry_run_what_it_would_do(run, tmp_path
     run("rm", "halves")
 
 
-def test_a_mesh_through_the_command_and_out_again(run, mesh_file, tmp_path):
-    created = run("create", "cli", mesh_file, "--json")
+def test_a_mesh_through_the_command_and_out_again(shell, mesh_file, tmp_path):
+    created = shell("create", "cli", mesh_file, "--json")
     assert created.returncode == 0, created.stderr
     assert json.loads(created.stdout)["counts"] == {"vertices": 5, "edges": 9, "faces": 7, "cells": 2}
     assert created.stderr == ""
-    listed = json.loads(run("ls", "--json").stdout)
+    listed = json.loads(shell("ls", "--json").stdout)
     assert [info["name"] for info in listed] == ["cli"]
-    exported = json.loads(run("--json", "export", "cli", tmp_path / "out.vtu").stdout)
+    exported = json.loads(shell("--json", "export", "cli", tmp_path / "out.vtu").stdout)
     assert exported["revision"] == 1 and exported["tetra"] == 2
     assert (meshio.read(tmp_path / "out.vtu").cells[0].data == two_tets().cells[0].data).all()
-    assert json.loads(run("rm", "cli", "--json").stdout) == {"name": "cli", "revision": 1}
-    assert json.loads(run("ls", "--json").stdout) == []
+    assert json.loads(shell("rm", "cli", "--json").stdout) == {"name": "cli", "revision": 1}
+    assert json.loads(shell("ls", "--json").stdout) == []
 
 
 @pytest.mark.parametrize(
@@ -114,6 +134,11 @@ def test_a_mesh_through_the_command_and_out_again(run, mesh_file, tmp_path):
         ("create", "odd", "--slot-map", "map.npz"),
         ("create", "odd", "FILE", "--slot-map", "map.npz"),
         ("store", "odd", "none", "vertex-cell"),
+        ("set-checks", "odd", "none", "inverted=warn"),
+        ("set-checks", "odd", "inverted=never"),
+        ("set-checks", "odd", "upside_down=warn"),
+        ("set-checks", "odd", "quality=warn:high"),
+        ("merge", "odd", "1", "2", "3"),
     ],
 )
 def test_options_that_make_no_sense_together_are_refused(run, mesh_file, arguments):
@@ -190,12 +215,27 @@ def test_a_mesh_that_is_refused_makes_no_session(run, tmp_path):
     run("rm", "refused")
 
 
-def test_errors_are_one_line_with_the_reason(run):
-    missing = run("info", "nobody")
+def test_errors_are_one_line_with_the_reason(shell):
+    missing = shell("info", "nobody")
     assert (missing.returncode, missing.stdout) == (1, "")
     assert missing.stderr.startswith("dynmesh: ") and missing.stderr.endswith("[SESSION_NOT_FOUND]\n")
-    unreachable = run("ls", target="unix:/nonexistent/socket")
+    unreachable = shell("ls", target="unix:/nonexistent/socket")
     assert unreachable.returncode == 1 and unreachable.stderr.count("\n") == 1
+    assert shell("frobnicate").returncode == 2
+
+
+def test_errors_are_json_for_programs(run):
+    missing = run("undo", "nobody", "--json")
+    assert (missing.returncode, missing.stdout) == (1, "")
+    error = json.loads(missing.stderr)["error"]
+    assert (error["type"], error["reason"], error["metadata"]) == (
+        "NotFoundError",
+        "SESSION_NOT_FOUND",
+        {"session": "nobody"},
+    )
+    assert error["message"]
+    unread = json.loads(run("--json", "create", "nobody", "/nonexistent.vtu").stderr)["error"]
+    assert unread["type"] == "FileNotFoundError" and "/nonexistent.vtu" in unread["message"]
 
 
 @pytest.mark.parametrize(
@@ -206,7 +246,9 @@ def test_wrong_usage_is_2(run, args):
 
 
 def test_help_is_there_for_every_command(run):
-    for command in ("serve", "create", "import", "store", "export", "ls", "info", "watch", "query", "rm"):
+    commands = "serve create import export ls info check set-checks query watch store rm undo redo repair adapt"
+    operators = "split collapse swap smooth dissolve merge"
+    for command in (*commands.split(), *operators.split()):
         shown = run(command, "--help")
         assert shown.returncode == 0 and "usage: dynmesh" in shown.stdout
 
@@ -332,6 +374,47 @@ def test_the_command_says_by_its_exit_code_whether_something_is_bad(session, run
     assert "vertex_link: reject" in run("info", session.name).stdout
 
 
+def test_a_check_that_fails_is_told_from_one_that_finds_something(run):
+    assert run("check", "nobody").returncode == 2
+    assert json.loads(run("check", "nobody", "--json").stderr)["error"]["reason"] == "SESSION_NOT_FOUND"
+    assert run("check", "nobody", target="unix:/nonexistent/socket").returncode == 2
+    told = run("check", "--help").stdout
+    assert "Exit code: 0 if nothing is bad" in " ".join(told.split())
+
+
+def test_checks_of_batches_are_set_by_name(session, run):
+    session.import_mesh(two_tets())
+    told = json.loads(run("set-checks", session.name, "inverted=reject", "min_dihedral=warn:5", "--json").stdout)
+    assert told["checks"].keys() == {"inverted", "min_dihedral"}
+    assert session.info().checks["min_dihedral"] == ("warn", 5.0)
+    assert run("set-checks", session.name, "none").returncode == 0
+    assert session.info().checks == {}
+
+
+def test_merge_welds_pairs_of_vertices(session, run):
+    points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [5, 0, 0], [6, 0, 0], [5, 1, 0]], dtype=float)
+    session.import_mesh(points, {"triangle": [[0, 1, 2], [3, 4, 5]]})
+    told = json.loads(run("merge", session.name, 1, 3, "--json").stdout)
+    assert (told["revision"], told["counts"]["vertices"]) == (2, 5)
+    refused = run("merge", session.name, 0, 1)
+    assert refused.returncode == 1 and "[EDGE_EXISTS]" in refused.stderr
+
+
+def test_changes_of_all_of_a_session_take_a_revision(session, run):
+    session.import_mesh(two_tets())
+    with session.edit() as tx:
+        tx.add_vertices([[9, 9, 9]])
+    late = ("--if-revision", 1)
+    for command in (("undo", session.name), ("redo", session.name), ("repair", session.name, "--remove-isolated")):
+        refused = run(*command, *late)
+        assert refused.returncode == 1 and "[REVISION_MISMATCH]" in refused.stderr
+    assert session.revision == 2
+    assert run("undo", session.name, "--if-revision", 2).returncode == 0
+    assert run("redo", session.name, "--if-revision", 3).returncode == 0
+    assert run("repair", session.name, "--remove-isolated", "--if-revision", 4).returncode == 0
+    assert session.revision == 5 and session.counts.vertices == 5
+
+
 def test_the_command_refuses_checks_that_it_does_not_know(session, run):
     assert run("check", session.name, "--only", "no_such").returncode == 2
-    assert run("check", session.name, "--only", "quality", "--fail-on", "genus").returncode == 1
+    assert run("check", session.name, "--only", "quality", "--fail-on", "genus").returncode == 2

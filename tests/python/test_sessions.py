@@ -148,7 +148,7 @@ def test_relations_that_cannot_be_stored_are_refused(session):
     with pytest.raises(dynmesh.InvalidArgumentError, match="twice"):
         session.store_relations([("cell", "cell"), (dynmesh.EntityKind.CELL, "cell")])
     with pytest.raises(dynmesh.InvalidArgumentError, match="pair of kinds"):
-        session.store_relations("vertex-cell")
+        session.store_relations(["vertex-cell"])
     with pytest.raises(dynmesh.AbortedError, match="ETAG_MISMATCH"):
         session.store_relations([], etag="another")
     assert session.info().stored_relations == {}

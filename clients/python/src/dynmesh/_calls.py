@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import random
 import time
 from collections.abc import Callable, Iterable, Iterator
@@ -10,13 +9,8 @@ from typing import Any, TypeVar
 
 import grpc
 
-from .errors import (
-    DynmeshError,
-    InvalidArgumentError,
-    ResourceExhaustedError,
-    UnavailableError,
-    from_rpc_error,
-)
+from .arguments import as_int64, as_seconds
+from .errors import DynmeshError, ResourceExhaustedError, UnavailableError, from_rpc_error
 
 Reply = TypeVar("Reply")
 
@@ -26,6 +20,7 @@ HARD_MESSAGE_FACTOR = 4
 
 _FIRST_BACKOFF_S = 0.05
 _MAX_BACKOFF_S = 2.0
+_NO_LIMIT_S = 1e9  # decades; what gRPC takes for the past is far beyond
 
 
 class Backoff:
@@ -59,9 +54,9 @@ class Caller:
     """
 
     def __init__(self, timeout: float, retries: int, max_message_bytes: int = DEFAULT_MAX_MESSAGE_BYTES) -> None:
-        self._timeout = timeout
-        self._retries = retries
-        self._max_message_bytes = max_message_bytes
+        self._timeout = as_seconds(timeout)
+        self._retries = as_int64(retries, "retries", 0)
+        self._max_message_bytes = as_int64(max_message_bytes, "max_message_bytes", 1)
 
     def check_size(self, request: Any) -> None:
         """Refuses a message that gRPC would refuse at the other end without saying why.
@@ -123,10 +118,7 @@ class Caller:
             yield request
 
     def _seconds(self, timeout: float | None) -> float:
-        seconds = self._timeout if timeout is None else timeout
-        if not seconds > 0:  # NaN too
-            raise InvalidArgumentError(f"timeout must be more than 0 seconds, not {seconds}", reason="BAD_ARGUMENT")
-        return seconds
+        return self._timeout if timeout is None else as_seconds(timeout)
 
 
 def _once(method: Callable[..., Reply], request: Any, deadline: float) -> Reply:
@@ -137,4 +129,4 @@ def _once(method: Callable[..., Reply], request: Any, deadline: float) -> Reply:
 
 
 def _grpc_timeout(seconds: float) -> float | None:
-    return None if math.isinf(seconds) else seconds
+    return None if seconds > _NO_LIMIT_S else seconds

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from .arrays import as_count, as_number
+from .arguments import as_count, as_number, as_text
 from .errors import InternalError, InvalidArgumentError
 from .progress import Progress
 from .v1 import adapt_pb2
@@ -76,7 +76,9 @@ class AdaptResult:
     revision : int
         The session's when the result was measured.
     end : {"converged", "max_passes", "max_elements"}
-        Why it ended: edges have the target length as far as they can; there is more to do; splits were left out.
+        Why it ended. "converged": the last pass split and collapsed fewer than one edge in 500, so edges have the
+        target length but for some that may not be changed and a few more; elements below ``min_quality`` may be left.
+        "max_passes": the last pass still did more. "max_elements": splits were left out.
     passes, splits, collapses, swaps, moves : int
         Operations that were carried out.
     refusals : dict of str to int
@@ -111,7 +113,7 @@ def adapt_request(
     return adapt_pb2.AdaptSessionRequest(
         session=session,
         target_length=None if target_length is None else as_number(target_length, "target_length"),
-        size_attribute=size_attribute,
+        size_attribute=None if size_attribute is None else as_text(size_attribute, "size_attribute"),
         min_quality=as_number(min_quality, "min_quality"),
         feature_angle=as_number(feature_angle, "feature_angle"),
         max_passes=as_count(max_passes, "max_passes"),

@@ -16,16 +16,19 @@ Points = NDArray[np.float64]
 CHUNK_BYTES = 1 << 20
 
 
+def as_array(values: ArrayLike, what: str) -> NDArray[Any]:
+    """`values` as they are. Raises `InvalidArgumentError` for rows of different lengths."""
+    try:
+        return np.asarray(values)
+    except ValueError:  # ragged rows
+        raise InvalidArgumentError(
+            f"{what} must be rows of equal length", reason="BAD_ARRAY_LENGTH", metadata={"field": what}
+        ) from None
+
+
 def as_ids(values: ArrayLike, what: str = "ids") -> Ids:
     """`values` as uint32[n]. Raises `InvalidArgumentError` for anything but a row of such integers."""
     return _as_uint32(values, what, ndim=1)
-
-
-def as_int64(value: int, what: str) -> int:
-    """`value` for an int64 field. Raises `InvalidArgumentError` for what does not fit."""
-    if isinstance(value, (int, np.integer)) and not isinstance(value, bool) and -(2**63) <= value < 2**63:
-        return int(value)
-    raise InvalidArgumentError(f"{what} is no 64-bit integer: {value!r}", reason="BAD_ARGUMENT", metadata={"field": what})
 
 
 def as_id_rows(values: ArrayLike, width: int, what: str) -> Ids:
@@ -42,7 +45,7 @@ def as_id_rows(values: ArrayLike, width: int, what: str) -> Ids:
 
 def as_points(values: ArrayLike, what: str = "positions") -> Points:
     """`values` as float64[n, 3]. Single precision and integers are widened; an empty list is no points."""
-    points = _as_array(values, what)
+    points = as_array(values, what)
     if points.size == 0 and points.ndim <= 2:
         return np.zeros((0, 3))
     if points.ndim != 2 or points.shape[1] != 3:
@@ -56,28 +59,13 @@ def as_points(values: ArrayLike, what: str = "positions") -> Points:
 
 def as_point_rows(values: ArrayLike, what: str) -> Points:
     """`values` as float64[n, 3], where one point alone is one row."""
-    array = _as_array(values, what)
+    array = as_array(values, what)
     return as_points(array[np.newaxis] if array.shape == (3,) else array, what)
-
-
-def as_number(value: float, what: str) -> float:
-    """`value` as a float. Raises `InvalidArgumentError` for what is none."""
-    if isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool):
-        return float(value)
-    raise InvalidArgumentError(f"{what} is no number: {value!r}", reason="BAD_ARGUMENT", metadata={"field": what})
-
-
-def as_count(value: int, what: str) -> int:
-    """`value` for a uint32 field where 0 stands for a default: 1 or more. Raises `InvalidArgumentError`."""
-    number = as_int64(value, what)
-    if 1 <= number <= 0xFFFFFFFF:
-        return number
-    raise InvalidArgumentError(f"{what} is not positive: {value}", reason="BAD_ARGUMENT", metadata={"field": what})
 
 
 def as_numbers(values: ArrayLike, count: int, what: str) -> Points:
     """`values` as float64[count]; one number stands for all. Raises `InvalidArgumentError` for anything else."""
-    numbers = _as_array(values, what)
+    numbers = as_array(values, what)
     if numbers.dtype.kind not in "iuf":
         raise InvalidArgumentError(f"{what} must be real numbers, not {numbers.dtype}", reason="BAD_ARGUMENT")
     if numbers.ndim > 0 and numbers.shape != (count,):
@@ -87,7 +75,7 @@ def as_numbers(values: ArrayLike, count: int, what: str) -> Points:
 
 def as_integers(values: ArrayLike) -> NDArray[np.int64] | None:
     """`values` as int64 of any shape; None for what are no such integers."""
-    array = _as_array(values, "ids")
+    array = as_array(values, "ids")
     if array.size == 0 or array.dtype.kind not in "iu" or (array.dtype == np.uint64 and (array >> 63).any()):
         return None
     return array.astype(np.int64, copy=False)
@@ -122,7 +110,7 @@ def frozen(array: NDArray[Any]) -> NDArray[Any]:
 
 
 def _as_uint32(values: ArrayLike, what: str, ndim: int | None, width: int = 1) -> Ids:
-    array = _as_array(values, what)
+    array = as_array(values, what)
     if array.size == 0:
         array = array.astype(np.uint32)
     if array.dtype.kind not in "iu":
@@ -133,15 +121,6 @@ def _as_uint32(values: ArrayLike, what: str, ndim: int | None, width: int = 1) -
         )
     _check_range(array, what, width)
     return array.astype(np.uint32, copy=False)
-
-
-def _as_array(values: ArrayLike, what: str) -> NDArray[Any]:
-    try:
-        return np.asarray(values)
-    except ValueError:  # ragged rows
-        raise InvalidArgumentError(
-            f"{what} must be rows of equal length", reason="BAD_ARRAY_LENGTH"
-        ) from None
 
 
 def _check_range(array: NDArray[Any], what: str, width: int) -> None:

@@ -21,8 +21,12 @@ DTYPE_NAMES = "float64, float32, int64, int32 or uint8"
 
 
 def type_number(dtype: DTypeLike) -> int | None:
-    """Number of a scalar type; None for one that columns cannot have."""
-    return next((number for number, scalar in SCALARS.items() if scalar == np.dtype(dtype)), None)
+    """Number of a scalar type; None for one that columns cannot have, or that is none."""
+    try:
+        wanted = np.dtype(dtype)
+    except TypeError:
+        return None
+    return next((number for number, scalar in SCALARS.items() if scalar == wanted), None)
 
 
 def policy_number(policy: str | None) -> int | None:

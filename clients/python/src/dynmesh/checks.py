@@ -11,19 +11,20 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import Ids, as_number, concatenate, from_bytes
-from .errors import InternalError, InvalidArgumentError
+from .arguments import as_number, bad_argument
+from .arrays import Ids, concatenate, from_bytes
+from .errors import InternalError
 from .kinds import EntityKind
 from .progress import Progress
 from .v1 import checks_pb2, types_pb2
 
 _PREFIX = "CHECK_KIND_"
-_SEVERITIES = {
+SEVERITIES = {
     "off": types_pb2.CHECK_SEVERITY_OFF,
     "warn": types_pb2.CHECK_SEVERITY_WARN,
     "reject": types_pb2.CHECK_SEVERITY_REJECT,
 }
-_SEVERITY_NAMES = {number: name for name, number in _SEVERITIES.items()}
+_SEVERITY_NAMES = {number: name for name, number in SEVERITIES.items()}
 
 # Names of all checks by number; proto/dynmesh/v1/types.proto says what each measures, and its default threshold.
 _NAMES = {n: name.removeprefix(_PREFIX).lower() for name, n in types_pb2.CheckKind.items() if n}
@@ -187,6 +188,8 @@ class CheckReport:
 
 def checks_to_proto(checks: CheckSettings) -> list[types_pb2.CheckSetting]:
     """Settings by name as messages. Raises `InvalidArgumentError`."""
+    if not isinstance(checks, Mapping):
+        raise bad_argument("checks", f'checks are a mapping such as {{"inverted": "reject"}}, not {checks!r}')
     return [_setting_to_proto(name, value) for name, value in checks.items()]
 
 
@@ -221,13 +224,13 @@ def read_report(replies: Iterable[checks_pb2.CheckSessionResponse], progress: Pr
 
 def _setting_to_proto(name: str, value: str | tuple[str, float]) -> types_pb2.CheckSetting:
     if name not in CHECKS:
-        raise _bad_check(f"a check is one of {', '.join(CHECKS)}, not {name!r}")
+        raise bad_argument("checks", f"a check is one of {', '.join(CHECKS)}, not {name!r}")
     severity, threshold = (value, None) if isinstance(value, str) else _pair(name, value)
-    if severity not in _SEVERITIES:
-        raise _bad_check(f'a severity is "off", "warn" or "reject", not {severity!r}')
+    if severity not in SEVERITIES:
+        raise bad_argument("checks", f'a severity is "off", "warn" or "reject", not {severity!r}')
     return types_pb2.CheckSetting(
         check=types_pb2.CheckKind.Value(_PREFIX + name.upper()),
-        severity=_SEVERITIES[severity],
+        severity=SEVERITIES[severity],
         threshold=None if threshold is None else as_number(threshold, f"threshold of {name}"),
     )
 
@@ -235,11 +238,7 @@ def _setting_to_proto(name: str, value: str | tuple[str, float]) -> types_pb2.Ch
 def _pair(name: str, value: Any) -> tuple[str, float]:
     if isinstance(value, (tuple, list)) and len(value) == 2 and isinstance(value[0], str):
         return value[0], value[1]
-    raise _bad_check(f'{name} is set to "warn", ("warn", 5.0) or the like, not {value!r}')
-
-
-def _bad_check(message: str) -> InvalidArgumentError:
-    return InvalidArgumentError(message, reason="BAD_ARGUMENT", metadata={"field": "checks"})
+    raise bad_argument("checks", f'{name} is set to "warn", ("warn", 5.0) or the like, not {value!r}')
 
 
 def _result(

@@ -1,6 +1,7 @@
 """The command ``dynmesh``.
 
-Exit codes: 0 done, 1 refused or failed (one line with the reason on stderr), 2 wrong usage, 130 interrupted.
+Exit codes: 0 done, 1 refused or failed (one line with the reason on stderr), 2 wrong usage, 130 interrupted. Of
+``dynmesh check``: 0 good, 1 not, 2 failed.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from .cli_adapt import adapt, add_adapt
-from .cli_check import add_check, describe_report, run_check
+from .cli_check import CHECK_FAILED, CHECK_FOUND, add_check, add_settings, describe_report, run_check
 from .cli_edit import add_operators, operate
 from .cli_query import add_questions
 from .cli_repair import add_repair_options, describe_repair, repair, repair_record
@@ -46,8 +47,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except (DynmeshError, OSError) as error:
-        print(f"dynmesh: {_one_line(error)}", file=sys.stderr)
-        return _EXIT_ERROR
+        print(_error_line(error, as_json=args.json), file=sys.stderr)
+        return int(args.exit_code_of_errors)
     except KeyboardInterrupt:
         return _EXIT_INTERRUPTED
 
@@ -60,7 +61,10 @@ def make_parser() -> argparse.ArgumentParser:
         epilog="The daemon is found by --target, else by the environment variable DYNMESH_TARGET.",
     )
     parser.set_defaults(
-        target=os.environ.get("DYNMESH_TARGET", DEFAULT_TARGET), timeout=DEFAULT_TIMEOUT_S, json=False
+        target=os.environ.get("DYNMESH_TARGET", DEFAULT_TARGET),
+        timeout=DEFAULT_TIMEOUT_S,
+        json=False,
+        exit_code_of_errors=_EXIT_ERROR,
     )
     _add_common(parser)
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
@@ -76,7 +80,9 @@ def _add_common(parser: argparse.ArgumentParser) -> None:
     suppress = argparse.SUPPRESS
     parser.add_argument("--target", metavar="ADDRESS", default=suppress, help="host:port or unix:/path")
     parser.add_argument("--timeout", metavar="SECONDS", type=float, default=suppress, help="of each call")
-    parser.add_argument("--json", action="store_true", default=suppress, help="output for programs")
+    parser.add_argument(
+        "--json", action="store_true", default=suppress, help="output for programs; errors too, on stderr"
+    )
 
 
 def _command(commands: Any, name: str, run: Any, help_text: str, **options: Any) -> argparse.ArgumentParser:
@@ -126,17 +132,24 @@ def _add_writing(commands: Any) -> None:
         type=_relation,
         help="cell-edge, vertex-cell, edge-cell, vertex-face, cell-cell, vertex-vertex; or none",
     )
+    add_settings(_command(commands, "set-checks", _set_checks, "Make just these checks on each batch from now on."))
     help_text = "Repair a session, as one revision: the steps in the order in which they are listed."
     mend = _command(commands, "repair", _repair, help_text)
     mend.add_argument("name", metavar="NAME")
     add_repair_options(mend)
+    _add_if_revision(mend)
     for name, text in (("undo", "Take the last batches of edits back."), ("redo", "Do undone batches again.")):
         step = _command(commands, name, _undo if name == "undo" else _redo, text)
         step.add_argument("name", metavar="NAME")
         step.add_argument("count", metavar="N", nargs="?", type=_positive, default=1, help="batches (1)")
+        _add_if_revision(step)
     remove = _command(commands, "rm", _rm, "Delete a session. Asks first when typed at a terminal.")
     remove.add_argument("name", metavar="NAME")
     remove.add_argument("--yes", action="store_true", help="do not ask")
+
+
+def _add_if_revision(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--if-revision", metavar="R", type=int, help="only if the session is at this revision")
 
 
 def _add_import_options(parser: argparse.ArgumentParser) -> None:
@@ -165,14 +178,9 @@ def _add_reading(commands: Any) -> None:
         "file", metavar="FILE", help="its extension chooses meshio's format: .vtu holds everything"
     )
     export.add_argument("--no-slots", action="store_true", help="leave out the ids (dynmesh:slot)")
-    add_check(
-        _command(
-            commands,
-            "check",
-            _check,
-            "Check shapes and topology. Exit code 1 if something is bad that the session rejects, or --fail-on names.",
-        )
-    )
+    checking = _command(commands, "check", _check, "Check shapes and topology.")
+    checking.set_defaults(exit_code_of_errors=CHECK_FAILED)
+    add_check(checking)
     follow = _command(commands, "watch", _watch, "Follow a session: a line for each step, until interrupted.")
     follow.add_argument("name", metavar="NAME")
     follow.add_argument("--count", metavar="N", type=_positive, help="end after so many steps")
@@ -203,11 +211,12 @@ def _check_together(parser: argparse.ArgumentParser, args: argparse.Namespace) -
     """Refuses options that make no sense with others."""
     if getattr(args, "slot_map", None) and (args.file is None or args.slot_order != "hilbert"):
         parser.error("--slot-map tells the ids that FILE got with --slot-order hilbert: else item i gets id i")
-    relations = getattr(args, "relations", [])
-    if None in relations and len(relations) > 1:
-        parser.error("none stands alone: it switches all relations to on demand")
-    if getattr(args, "ends", False) and len(args.ids) % 2 != 0:
-        parser.error("--ends: the IDs are pairs of vertices, and one is left over")
+    chosen = getattr(args, "relations", []) or getattr(args, "checks", [])
+    if None in chosen and len(chosen) > 1:
+        parser.error("none stands alone: it switches all relations to on demand, or all checks off")
+    pairs = getattr(args, "ends", False) or getattr(args, "pairs", False)
+    if pairs and len(args.ids) % 2 != 0:
+        parser.error("the IDs are pairs of vertices, and one is left over")
     if getattr(args, "ends", False) and (getattr(args, "faces", False) or getattr(args, "kind", None)):
         parser.error("--ends names edges, which --faces and --kind do not")
     if getattr(args, "kind", None) and getattr(args, "at", None) is not None:
@@ -260,14 +269,22 @@ def _repair(args: argparse.Namespace) -> None:
     _print(args, repair_record(result), describe_repair(result))
 
 
+def _set_checks(args: argparse.Namespace) -> None:
+    with _client(args) as client:
+        wanted = dict(setting for setting in args.checks if setting is not None)
+        _print_info(args, client.session(args.name).set_checks(wanted))
+
+
 def _undo(args: argparse.Namespace) -> None:
     with _client(args) as client:
-        _print_history(args, "undid", client.session(args.name).undo(args.count))
+        result = client.session(args.name).undo(args.count, if_revision=args.if_revision)
+    _print_history(args, "undid", result)
 
 
 def _redo(args: argparse.Namespace) -> None:
     with _client(args) as client:
-        _print_history(args, "redid", client.session(args.name).redo(args.count))
+        result = client.session(args.name).redo(args.count, if_revision=args.if_revision)
+    _print_history(args, "redid", result)
 
 
 def _adapt(args: argparse.Namespace) -> None:
@@ -311,9 +328,9 @@ def _check(args: argparse.Namespace) -> int:
     with _client(args) as client:
         report, failed = run_check(client.session(args.name), args)
     _print(args, {**report.to_dict(), "failed": failed}, describe_report(report))
-    if failed:
+    if failed and not args.json:
         print(f"dynmesh: bad: {', '.join(failed)}", file=sys.stderr)
-    return _EXIT_ERROR if failed else 0
+    return CHECK_FOUND if failed else 0
 
 
 def _query(args: argparse.Namespace) -> None:
@@ -365,8 +382,13 @@ def _names(text: str) -> list[str]:
     return [name for name in text.split(",") if name]
 
 
-def _one_line(error: BaseException) -> str:
-    return " ".join(str(error).split())
+def _error_line(error: BaseException, *, as_json: bool) -> str:
+    if not as_json:
+        return "dynmesh: " + " ".join(str(error).split())
+    record: dict[str, Any] = {"type": type(error).__name__, "message": str(error), "reason": "", "metadata": {}}
+    if isinstance(error, DynmeshError):
+        record |= {"message": error.message, "reason": error.reason, "metadata": error.metadata}
+    return json.dumps({"error": record})
 
 
 def _print(args: argparse.Namespace, value: Any, text: str) -> None:

@@ -1,19 +1,26 @@
-"""``dynmesh check``: a report, and an exit code for scripts."""
+"""``dynmesh check``: a report, and an exit code for scripts. ``dynmesh set-checks``: what each batch is checked for."""
 
 from __future__ import annotations
 
 import argparse
 from typing import Any
 
-from .checks import CHECKS, CheckReport, CheckResult, SurfaceTopology
+from .checks import CHECKS, SEVERITIES, CheckReport, CheckResult, SurfaceTopology
 from .errors import InvalidArgumentError
 from .session import Session
+
+# Exit codes.
+CHECK_FOUND, CHECK_FAILED = 1, 2
 
 _SHOWN_IDS = 8
 
 
 def add_check(parser: argparse.ArgumentParser) -> None:
     """Adds the arguments."""
+    parser.epilog = (
+        "Exit code: 0 if nothing is bad that the session rejects, or that --fail-on names; 1 if something is; "
+        "2 if the session could not be checked, or for wrong usage."
+    )
     parser.add_argument("name", metavar="NAME")
     parser.add_argument(
         "--only", metavar="CHECKS", type=_check_names, help="separated by commas (default: all): " + ", ".join(CHECKS)
@@ -22,10 +29,26 @@ def add_check(parser: argparse.ArgumentParser) -> None:
         "--fail-on",
         metavar="CHECKS",
         type=_check_names,
-        help="exit with 1 if one of these finds something bad (default: those that the session rejects)",
+        help="for the exit code (default: those that the session rejects)",
     )
     parser.add_argument(
         "--max-findings", metavar="N", type=int, default=1000, help="entities named for each check and kind (1000)"
+    )
+
+
+def add_settings(parser: argparse.ArgumentParser) -> None:
+    """Adds the arguments of ``set-checks``."""
+    parser.epilog = (
+        "What each check measures, and its own threshold, is said in proto/dynmesh/v1/types.proto. Checks: "
+        + ", ".join(CHECKS)
+    )
+    parser.add_argument("name", metavar="NAME")
+    parser.add_argument(
+        "checks",
+        metavar="CHECK=SEVERITY[:THRESHOLD]",
+        nargs="+",
+        type=_check_setting,
+        help="severities are warn, reject and off: inverted=reject, min_dihedral=warn:5; or none",
     )
 
 
@@ -72,6 +95,19 @@ def _first_ids(result: CheckResult) -> str:
 def _surface(title: str, surface: SurfaceTopology) -> str:
     parts: dict[str, Any] = surface._asdict()
     return f"{title}: " + ", ".join(f"{name.replace('_', ' ')} {count}" for name, count in parts.items())
+
+
+def _check_setting(text: str) -> tuple[str, str | tuple[str, float]] | None:
+    if text == "none":
+        return None
+    name, _, value = text.partition("=")
+    severity, colon, threshold = value.partition(":")
+    if name not in CHECKS or severity not in SEVERITIES:
+        raise argparse.ArgumentTypeError(f"{text} is not a check and a severity such as inverted=reject")
+    try:
+        return name, (severity, float(threshold)) if colon else severity
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{threshold} in {text} is not a number") from None
 
 
 def _check_names(text: str) -> list[str]:

@@ -1,4 +1,4 @@
-"""``dynmesh split``, ``collapse``, ``swap``, ``smooth`` and ``dissolve``: operators on what is named, as one revision."""
+"""``dynmesh split``, ``collapse``, ``swap``, ``smooth``, ``dissolve`` and ``merge``: operators, as one revision."""
 
 from __future__ import annotations
 
@@ -34,8 +34,16 @@ def add_operators(add: AddCommand) -> None:
     smooth.add_argument("--move-boundary", action="store_true", help="vertices of the boundary, too")
     dissolve = add("dissolve", "Remove each vertex and close the gap.")
     _add_places(dissolve, "vertices", ends=False)
+    merge = add("merge", "Weld pairs of vertices that no edge joins: the second of each becomes the first.")
+    _add_places(merge, "vertices, two for each pair", ends=False)
+    merge.set_defaults(pairs=True)
     for parser, operate in (
-        (split, _split), (collapse, _collapse), (swap, _swap), (smooth, _smooth), (dissolve, _dissolve)
+        (split, _split),
+        (collapse, _collapse),
+        (swap, _swap),
+        (smooth, _smooth),
+        (dissolve, _dissolve),
+        (merge, _merge),
     ):
         parser.set_defaults(operate=operate)
 
@@ -99,6 +107,10 @@ def _smooth(session: Session, tx: Any, args: argparse.Namespace) -> None:
 
 def _dissolve(_: Session, tx: Any, args: argparse.Namespace) -> None:
     tx.dissolve_vertices(args.ids, **_limits(args))
+
+
+def _merge(_: Session, tx: Any, args: argparse.Namespace) -> None:
+    tx.merge_vertices(np.array(args.ids).reshape(-1, 2), **_limits(args))
 
 
 def _record(result: EditResult) -> dict[str, Any]:

@@ -42,7 +42,9 @@ def repair(session: Session, args: argparse.Namespace) -> RepairResult:
         orient=args.orient,
         fill_holes=args.fill_holes,
     )
-    return session.repair([_with_isolated(step, args) for step in steps], validate_only=args.dry_run)
+    return session.repair(
+        [_with_isolated(step, args) for step in steps], if_revision=args.if_revision, validate_only=args.dry_run
+    )
 
 
 def repair_record(result: RepairResult) -> dict[str, Any]:

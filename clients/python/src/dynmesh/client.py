@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import uuid
 from collections.abc import Iterable, Iterator
 from types import MappingProxyType, TracebackType
 
 import grpc
 
 from ._calls import DEFAULT_MAX_MESSAGE_BYTES, Caller
+from .arguments import as_int64, as_request_id, as_text, as_word
 from .checks import CheckSettings, checks_to_proto
-from .errors import InvalidArgumentError
 from .info import SessionInfo, info_from_proto
 from .relations import RelationLike, relations_to_proto
 from .session import Session
@@ -43,10 +42,10 @@ class Client:
     def __init__(
         self, target: str, timeout: float, retries: int, max_message_bytes: int, read_ahead_bytes: int | None
     ) -> None:
-        self.target = target
+        self.target = as_text(target, "target")
         options = (*_CHANNEL_OPTIONS, *_window_options(read_ahead_bytes))
-        self._channel = grpc.insecure_channel(target, options=options)
         self._caller = Caller(timeout, retries, max_message_bytes)
+        self._channel = grpc.insecure_channel(target, options=options)
         self._sessions = sessions_pb2_grpc.SessionServiceStub(self._channel)
 
     def __repr__(self) -> str:
@@ -97,20 +96,19 @@ class Client:
         ------
         AlreadyExistsError, InvalidArgumentError
         """
-        if duplicates not in _POLICIES:
-            raise InvalidArgumentError(f'duplicates is "keep" or "refuse", not {duplicates!r}')
+        made = self.session(name)
         settings = sessions_pb2.SessionSettings(
-            duplicate_policy=_POLICIES[duplicates],
+            duplicate_policy=_POLICIES[as_word(duplicates, _POLICIES, "duplicates")],
             stored_relations=relations_to_proto(stored_relations),
             checks=checks_to_proto(checks),
         )
         request = sessions_pb2.CreateSessionRequest(
             name=name,
             settings=settings,
-            request_id=request_id or uuid.uuid4().hex,
+            request_id=as_request_id(request_id),
         )
         self._caller.unary(self._sessions.CreateSession, request, timeout, repeatable=True)
-        return self.session(name)
+        return made
 
     def sessions(self, *, timeout: float | None = None) -> Iterator[SessionInfo]:
         """All sessions by name, fetched in pages; `timeout` is that of each page."""
@@ -160,8 +158,5 @@ def connect(
 def _window_options(read_ahead_bytes: int | None) -> tuple[tuple[str, int], ...]:
     if read_ahead_bytes is None:
         return ()
-    if not _LEAST_WINDOW <= read_ahead_bytes < 2**31:
-        raise InvalidArgumentError(
-            f"read_ahead_bytes is at least {_LEAST_WINDOW}, not {read_ahead_bytes}", reason="BAD_ARGUMENT"
-        )
-    return ("grpc.http2.bdp_probe", 0), ("grpc.http2.lookahead_bytes", read_ahead_bytes)
+    window = as_int64(read_ahead_bytes, "read_ahead_bytes", _LEAST_WINDOW, 2**31 - 1)
+    return ("grpc.http2.bdp_probe", 0), ("grpc.http2.lookahead_bytes", window)

@@ -14,6 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
+from .arguments import as_int64, as_text
+from .arrays import as_array
 from .attribute_types import DTYPE_NAMES, POLICIES, SCALARS, exactly, policy_number, type_number
 from .errors import InvalidArgumentError
 from .kinds import EntityKind
@@ -55,14 +57,14 @@ def make_spec(
     """
     number, of_policy = type_number(dtype), policy_number(policy)
     if number is None:
-        raise _bad_field(name, "type", f"is {np.dtype(dtype)}; columns are {DTYPE_NAMES}")
+        raise _bad_field(name, "type", f"is {getattr(dtype, '__name__', dtype)}; columns are {DTYPE_NAMES}")
     if of_policy is None:
         raise _bad_field(name, "policy", f"has policy {policy!r}, none of {', '.join(POLICIES.values())}")
     return types_pb2.AttributeSpec(
-        name=name,
+        name=as_text(name, "name"),
         kind=int(kind),
         type=number,
-        components=components,
+        components=as_int64(components, "components", 1, _MAX_COMPONENTS),
         default_row=b"" if default is None else _default_row(name, default, SCALARS[number], components),
         policy=of_policy,
     )
@@ -85,7 +87,7 @@ def as_values(values: ArrayLike, name: str) -> NDArray[Any]:
     float16 becomes float32; booleans uint8; int8, int16 and uint16 int32; uint32 int64, and uint64 if every
     value fits. Raises `InvalidArgumentError` otherwise, and for more than 16 components.
     """
-    array = np.asarray(values)
+    array = as_array(values, "values")
     rows = array.reshape(-1, 1) if array.ndim == 1 else array
     if rows.ndim != 2 or not 1 <= rows.shape[1] <= _MAX_COMPONENTS:
         raise _unfit(name, f"has shape {array.shape}; columns have shape (n,) or (n, 1 to {_MAX_COMPONENTS})")
@@ -155,7 +157,7 @@ def _nearest(dtype: np.dtype[Any]) -> DTypeLike | None:
 
 
 def _default_row(name: str, default: ArrayLike, scalar: np.dtype[Any], components: int) -> bytes:
-    row = np.asarray(default)
+    row = as_array(default, "default")
     if row.shape not in ((), (components,)):
         what = f"has a default of shape {row.shape} for {components} components"
         raise _bad_field(name, "default_row", what)

@@ -10,12 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike
 
+from .arguments import as_count, as_number, as_word, bad_argument
 from .arrays import (
     Ids,
-    as_count,
     as_id_rows,
     as_ids,
-    as_number,
     as_numbers,
     as_points,
     concatenate,
@@ -68,7 +67,7 @@ class EditBatch:
         return self._append(remove_vertices=edits_pb2.RemoveVertices(ids=u32_bytes(as_ids(self._wire(ids)))))
 
     def move_vertices(self, ids: ArrayLike, positions: ArrayLike) -> int:
-        """Moves vertices (uint32[n]) to positions (float[n, 3]); returns the edit's index."""
+        """Moves vertices (uint32[n]) to positions (float[n, 3]); returns the edit's index. Attributes stay."""
         slots, points = as_ids(self._wire(ids)), as_points(positions)
         _check_same_length("positions", len(points), len(slots))
         move = edits_pb2.MoveVertices(ids=u32_bytes(slots), positions=f64_bytes(points))
@@ -319,7 +318,7 @@ class EditBatch:
         """Moves vertices to where the elements at them are better; returns the edit's index.
 
         A move that the limits or the method do not permit is halved, up to four times; then the vertex stays.
-        ``tx.result.num_moved[index]`` says how many moved.
+        ``tx.result.num_moved[index]`` says how many moved. Attributes stay what they are.
 
         Parameters
         ----------
@@ -446,16 +445,21 @@ class Transaction(EditBatch):
             raise RuntimeError("the batch has ended with its with block: begin another with session.edit()")
 
 
+def as_batch(batch: EditBatch) -> EditBatch:
+    """`batch`, if it is one. Raises `InvalidArgumentError`."""
+    if isinstance(batch, EditBatch):
+        return batch
+    raise bad_argument("batch", f"batch is no EditBatch: {batch!r}")
+
+
 def _limits(allow_inversion: bool, min_quality: float) -> edits_pb2.OperatorLimits:
     quality = as_number(min_quality, "min_quality")
     return edits_pb2.OperatorLimits(allow_inversion=bool(allow_inversion), min_quality=quality)
 
 
 def _smooth_method(name: str) -> int:
-    methods = {"laplacian", "guarded", "optimizing"}
-    if name not in methods:
-        raise InvalidArgumentError(f"method {name!r} is none of {sorted(methods)}", reason="BAD_ARGUMENT")
-    return edits_pb2.SmoothMethod.Value(f"SMOOTH_METHOD_{name.upper()}")
+    method = as_word(name, ("guarded", "laplacian", "optimizing"), "method")
+    return edits_pb2.SmoothMethod.Value(f"SMOOTH_METHOD_{method.upper()}")
 
 
 def _places(parameters: ArrayLike | None, positions: ArrayLike | None, count: int) -> dict[str, bytes]:

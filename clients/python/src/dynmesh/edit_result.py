@@ -63,7 +63,8 @@ class EditResult:
     Attributes
     ----------
     revision : int
-        After the batch; of ``validate_only`` the revision that it was checked against.
+        After the batch; of ``validate_only`` the revision that it was checked against. A batch without effect (whose
+        items were all passed over, say) makes a revision too, but `Session.undo` does not count it.
     new_ids : tuple of uint32[n]
         For each edit the ids of what it added, in order.
     new_vertices : uint32[n]

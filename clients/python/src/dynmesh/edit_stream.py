@@ -12,7 +12,8 @@ from typing import Any
 
 import grpc
 
-from .edit import EditBatch
+from .arguments import as_count
+from .edit import EditBatch, as_batch
 from .edit_result import EditResult
 from .errors import CancelledError, DynmeshError, from_rpc_error, make_error
 from .v1 import edits_pb2
@@ -43,7 +44,7 @@ class EditStream:
         self._check_size = check_size
         self._requests: queue.SimpleQueue[edits_pb2.StreamEditsRequest | None] = queue.SimpleQueue()
         self._pending: deque[_Pending] = deque()
-        self._room = threading.Semaphore(window)
+        self._room = threading.Semaphore(as_count(window, "window"))
         self._lock = threading.Lock()
         self._broken: DynmeshError | None = None
         self._call = method(iter(self._requests.get, None))
@@ -67,7 +68,7 @@ class EditStream:
         """
         future: Future[EditResult] = Future()
         future.set_running_or_notify_cancel()  # sent is sent
-        request = edits_pb2.StreamEditsRequest(batch=self._make_request(batch))
+        request = edits_pb2.StreamEditsRequest(batch=self._make_request(as_batch(batch)))
         self._check_size(request)
         self._room.acquire()
         with self._lock:

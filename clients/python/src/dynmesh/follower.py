@@ -63,7 +63,7 @@ class Follower:
         self._thread.start()
 
     def set_paused(self, paused: bool) -> None:
-        """While paused, nothing is read beyond the message that is on its way."""
+        """While paused, nothing is read beyond a message that has arrived already, which waits."""
         with self._condition:
             self._paused = paused
             self._condition.notify_all()
@@ -106,14 +106,14 @@ class Follower:
             call = self._call = self._subscribe(self._request)
         chunks: list[Delta] = []
         for message in call:
+            if self._closed_after_pause():
+                return
             backoff.reset()
             chunks.append(decode_delta(message.delta))
             self._sink.received(message)
             if message.consistent:
                 self._sink.take(tuple(chunks), message)
                 chunks.clear()
-            if self._closed_after_pause():
-                return
         self._recover(UnavailableError("the server ended the subscription"), backoff)
 
     def _closed_after_pause(self) -> bool:

@@ -15,6 +15,7 @@ from .errors import InvalidArgumentError
 NEW_VERTEX = 0x80000000
 _WIRE_MASK = 0xFFFFFFFF
 NUMBER_MASK = 0x7FFFFFFF
+NO_BATCH = 0  # that of ids which no batch is to take: all handles are foreign there
 
 
 def handles_from(batch_number: int, first: int, count: int) -> Ids:

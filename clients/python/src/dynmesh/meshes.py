@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import Ids, Points, as_id_rows, as_points
+from .arguments import as_list, as_text, bad_argument
+from .arrays import Ids, Points, as_array, as_id_rows, as_points
 from .columns import Column, cell_columns, point_columns
 from .errors import InvalidArgumentError
 from .kinds import WEDGE_OF_MESHIO, ElementType, EntityKind, as_element_type
@@ -54,8 +55,8 @@ def from_arrays(points: ArrayLike, cells: Cells) -> MeshData:
         Blocks of elements by meshio's names ("tetra", "wedge", ...) or ours ("tetrahedron", "prism").
         Nodes are in VTK's order, those of wedges too, where a `meshio.Mesh` has another.
     """
-    items = cells.items() if isinstance(cells, Mapping) else cells
-    return MeshData(as_points(points, "points"), [_block(name, rows) for name, rows in items])
+    items = cells.items() if isinstance(cells, Mapping) else as_list(cells, "cells")
+    return MeshData(as_points(points, "points"), [_block(*_pair(item)) for item in items])
 
 
 def from_meshio(mesh: meshio.Mesh, attributes: Collection[str] | None = None) -> MeshData:
@@ -103,15 +104,20 @@ def as_mesh_data(mesh: Any, cells: Cells | None, attributes: Collection[str] | N
 
 
 def _check_names(mesh: meshio.Mesh, attributes: Collection[str] | None) -> None:
-    if isinstance(attributes, str):
-        raise InvalidArgumentError("`attributes` is a collection of names, not a string", reason="BAD_ARGUMENT")
+    wanted = {as_text(name, "attributes") for name in as_list(attributes or (), "attributes")}
     there = set(mesh.point_data) | set(mesh.cell_data)
-    if missing := sorted(set(attributes or ()) - there):
+    if missing := sorted(wanted - there):
         raise InvalidArgumentError(
             f"the mesh has no data named {', '.join(missing)}; it has {', '.join(sorted(there)) or 'none'}",
             reason="UNKNOWN_ATTRIBUTE",
             metadata={"attribute": missing[0]},
         )
+
+
+def _pair(item: Any) -> tuple[ElementType | str, ArrayLike]:
+    if isinstance(item, (tuple, list)) and len(item) == 2:
+        return item[0], item[1]
+    raise bad_argument("cells", f"cells are pairs of a type and rows of vertices, not {item!r}")
 
 
 def _block(name: ElementType | str, rows: ArrayLike) -> tuple[ElementType, Ids]:
@@ -137,7 +143,7 @@ def _type_of_block(number: int, name: str) -> ElementType | None:
 
 
 def _points_3d(points: ArrayLike) -> Points:
-    array = np.asarray(points)
+    array = as_array(points, "points")
     if array.ndim == 2 and array.shape[1] == 2:
         array = np.column_stack([array, np.zeros(len(array), dtype=array.dtype)])
     return as_points(array, "points")

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from .arguments import as_int64, as_number
 from .arrays import Ids, Points, frozen
 from .checksum import Checksum
 from .delta import Delta
@@ -167,8 +168,9 @@ class Mirror:
 
         Raises `DeadlineExceededError` after `timeout` seconds (None: no limit), and what ended the mirror.
         """
+        as_int64(revision, "revision")
         with self._condition:
-            self._condition.wait_for(lambda: self._ended() or self._is_at(revision), timeout)
+            self._condition.wait_for(lambda: self._ended() or self._is_at(revision), _patience(timeout))
             if self._is_at(revision):
                 return self._state.revision
             self._raise_if_ended()
@@ -183,7 +185,7 @@ class Mirror:
         seen: Update | None = None
         while True:
             with self._condition:
-                self._condition.wait_for(lambda: self._ended() or self._last is not seen, timeout)
+                self._condition.wait_for(lambda: self._ended() or self._last is not seen, _patience(timeout))
                 if self._last is seen:
                     if self._closed:
                         return
@@ -194,7 +196,11 @@ class Mirror:
             yield seen
 
     def pause(self) -> None:
-        """Stops reading. The server queues nothing for it: after `resume` come fewer, larger deltas."""
+        """Stops following: no step is taken any more but one that has begun.
+
+        The server queues nothing for it. What it has sent already is taken first after `resume`; then come fewer,
+        larger deltas.
+        """
         self._follower.set_paused(True)
 
     def resume(self) -> None:
@@ -239,6 +245,13 @@ class Mirror:
             raise self._error
         if self._closed:
             raise MirrorError("the mirror is closed", reason="CLOSED")
+
+
+def _patience(timeout: float | None) -> float | None:
+    """Seconds for a condition, which takes no infinity."""
+    if timeout is None or as_number(timeout, "timeout") > threading.TIMEOUT_MAX:
+        return None
+    return float(timeout)
 
 
 class _MirrorSink:

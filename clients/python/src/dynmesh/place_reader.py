@@ -9,7 +9,8 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from ._calls import Caller
-from .arrays import Ids, as_count, as_number, as_point_rows
+from .arguments import as_count, as_number
+from .arrays import Ids, as_point_rows
 from .errors import InvalidArgumentError
 from .kinds import KindLike, as_kind
 from .places import (

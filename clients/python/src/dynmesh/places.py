@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .arguments import as_word
 from .arrays import CHUNK_BYTES, Ids, Points, as_point_rows, f64_bytes
 from .errors import InvalidArgumentError
 from .queries import joined, joined_offsets, revision_of
@@ -88,7 +89,7 @@ def parts_of(points: Points) -> list[bytes]:
 
 def ray_options(hits: str, targets: str) -> dict[str, Any]:
     """Fields of a CastRaysRequest. Raises `InvalidArgumentError` for unknown words."""
-    return {"hits": _word(hits, _HITS, "hits"), "targets": _word(targets, _TARGETS, "targets")}
+    return {"hits": _HITS[as_word(hits, _HITS, "hits")], "targets": _TARGETS[as_word(targets, _TARGETS, "targets")]}
 
 
 def read_in_box(replies: Iterable[queries_pb2.FindInBoxResponse]) -> tuple[Ids, int]:
@@ -125,11 +126,3 @@ def read_hits(replies: Iterable[queries_pb2.CastRaysResponse]) -> RayHits:
         t=joined(chunks, "parameters", "<f8"),
         revision=revision_of(chunks),
     )
-
-
-def _word(word: str, words: dict[str, int], what: str) -> int:
-    if not isinstance(word, str) or word not in words:
-        raise InvalidArgumentError(
-            f"{what} is one of {', '.join(words)}, not {word!r}", reason="BAD_ARGUMENT", metadata={"field": what}
-        )
-    return words[word]

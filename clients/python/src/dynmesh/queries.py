@@ -9,8 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .arguments import as_int64, bad_argument
 from .arrays import CHUNK_BYTES, Ids, Points, as_ids, concatenate, from_bytes, u32_bytes
-from .errors import AbortedError, InvalidArgumentError, UnimplementedError, make_error
+from .errors import AbortedError, UnimplementedError, make_error
+from .handles import NO_BATCH, to_wire
 from .kinds import EntityKind
 from .v1 import queries_pb2, types_pb2
 
@@ -115,13 +117,14 @@ def selections_of(ids: Selection, **filters: Any) -> list[types_pb2.Selection]:
 
     `filters` are the other fields of each.
 
-    Raises `InvalidArgumentError` for anything but ids, and for a slice with a step or negative ends.
+    Raises `InvalidArgumentError` for anything but ids, FOREIGN_HANDLE for handles of new vertices, and for a slice
+    with a step or negative ends.
     """
     if ids is None:
         return [types_pb2.Selection(all=True, **filters)]
     if isinstance(ids, slice):
         return [types_pb2.Selection(range=_range_of(ids), **filters)]
-    array = as_ids(ids)
+    array = as_ids(to_wire(ids, NO_BATCH))
     step = CHUNK_BYTES // 4
     parts = [array[begin : begin + step] for begin in range(0, max(array.size, 1), step)]
     return [types_pb2.Selection(ids=u32_bytes(part), **filters) for part in parts]
@@ -170,10 +173,11 @@ def read_surface(replies: Iterable[queries_pb2.GetBoundarySurfaceResponse]) -> S
 
 
 def _range_of(ids: slice) -> types_pb2.Selection.Range:
-    if ids.step not in (None, 1) or (ids.start or 0) < 0 or (ids.stop is not None and ids.stop < 0):
-        raise InvalidArgumentError(f"{ids} is not a range of ids", reason="BAD_ARGUMENT")
-    end = _END_OF_IDS if ids.stop is None else min(ids.stop, _END_OF_IDS)
-    return types_pb2.Selection.Range(begin=min(ids.start or 0, end), end=end)
+    if ids.step is not None and as_int64(ids.step, "step of ids") != 1:
+        raise bad_argument("ids", f"{ids} is not a range of ids")
+    begin = 0 if ids.start is None else as_int64(ids.start, "start of ids", 0)
+    end = _END_OF_IDS if ids.stop is None else min(as_int64(ids.stop, "stop of ids", 0), _END_OF_IDS)
+    return types_pb2.Selection.Range(begin=min(begin, end), end=end)
 
 
 def joined(chunks: list[Any], field: str, dtype: str = "<u4") -> NDArray[Any]:

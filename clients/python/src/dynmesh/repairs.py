@@ -9,9 +9,10 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import Ids, as_int64, as_number, from_bytes
+from .arguments import as_int64, as_list, as_number, bad_argument
+from .arrays import Ids, from_bytes
 from .checksum import Checksum
-from .errors import InternalError, InvalidArgumentError
+from .errors import InternalError
 from .info import Counts, checksum_from_proto, counts_from_proto
 from .progress import Progress
 from .v1 import repairs_pb2
@@ -119,11 +120,7 @@ class FillHoles:
 
     def to_proto(self) -> repairs_pb2.RepairStep:
         """The message."""
-        max_edges = as_int64(self.max_edges, "max_edges")
-        if not 0 <= max_edges < 2**32:
-            raise InvalidArgumentError(
-                f"max_edges is out of range: {max_edges}", reason="BAD_ARGUMENT", metadata={"field": "max_edges"}
-            )
+        max_edges = as_int64(self.max_edges, "max_edges", 0, 2**32 - 1)
         return repairs_pb2.RepairStep(fill_holes=repairs_pb2.FillHoles(max_edges=max_edges))
 
 
@@ -194,7 +191,7 @@ def choose_steps(
     """The steps, or those that the keywords name, in the order in which each helps the next."""
     named: list[RepairStep] = []
     if weld is not None:
-        named.append(Weld(weld))
+        named.append(Weld(as_number(weld, "weld")))
     if remove_duplicates:
         named.append(RemoveDuplicates())
     if split_non_manifold:
@@ -202,16 +199,15 @@ def choose_steps(
     if orient:
         named.append(Orient())
     if fill_holes is not None:
-        named.append(FillHoles(fill_holes))
+        named.append(FillHoles(as_int64(fill_holes, "fill_holes")))
     if orient and fill_holes is not None:
         named.append(Orient())  # a surface that is closed now can be made to face outwards
-    given = list(steps)
+    given = as_list(steps, "steps")
     if given and named:
-        raise InvalidArgumentError(
-            "name the steps of a repair by a list or by keywords, not both",
-            reason="BAD_ARGUMENT",
-            metadata={"field": "steps"},
-        )
+        raise bad_argument("steps", "name the steps of a repair by a list or by keywords, not both")
+    for step in given:
+        if not isinstance(step, RepairStep):
+            raise bad_argument("steps", f"a step of a repair is one of those of dynmesh.repairs, not {step!r}")
     return given or named
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Collection, Iterable
 from typing import TYPE_CHECKING
 
@@ -10,12 +11,21 @@ from google.protobuf import field_mask_pb2
 from numpy.typing import ArrayLike
 
 from ._calls import Caller
-from .arrays import as_int64
+from .arguments import (
+    INT32,
+    as_int64,
+    as_number,
+    as_request_id,
+    as_revision,
+    as_text,
+    as_word,
+    bad_argument,
+)
 from .delta import HAS_NATIVE
-from .edit import EditBatch, Transaction
+from .edit import EditBatch, Transaction, as_batch
 from .edit_result import EditResult
 from .edit_stream import EditStream
-from .errors import InvalidArgumentError, UnimplementedError
+from .errors import UnimplementedError
 from .files import PathLike, read_mesh
 from .info import SessionInfo, info_from_proto
 from .meshes import Cells, as_mesh_data
@@ -23,7 +33,7 @@ from .mirror import Mirror, Update
 from .mirror_state import MirrorState
 from .progress import Progress
 from .relations import RelationLike, relations_to_proto
-from .session_changes import SessionChanges, new_request_id
+from .session_changes import SessionChanges
 from .session_reader import FOREVER
 from .transfer import ImportResult, import_requests, read_import
 from .v1 import edits_pb2, sessions_pb2, subscriptions_pb2, subscriptions_pb2_grpc
@@ -72,7 +82,7 @@ class Session(SessionChanges):
 
         With `etag` (`SessionInfo.etag`) only if it has not changed since: else `AbortedError`.
         """
-        request = sessions_pb2.DeleteSessionRequest(name=self.name, etag=etag)
+        request = sessions_pb2.DeleteSessionRequest(name=self.name, etag=as_text(etag, "etag"))
         return self._caller.unary(self._sessions.DeleteSession, request, timeout, repeatable=False).revision
 
     def store_relations(
@@ -100,7 +110,7 @@ class Session(SessionChanges):
         """
         settings = sessions_pb2.SessionSettings(stored_relations=relations_to_proto(relations))
         request = sessions_pb2.UpdateSessionRequest(
-            session=sessions_pb2.Session(name=self.name, etag=etag, settings=settings),
+            session=sessions_pb2.Session(name=self.name, etag=as_text(etag, "etag"), settings=settings),
             update_mask=field_mask_pb2.FieldMask(paths=["settings.stored_relations"]),
         )
         # An update changes the etag: one that was made, but not answered, would refuse its own repetition.
@@ -150,17 +160,14 @@ class Session(SessionChanges):
             ``metadata["index"]`` is the position in the mesh.
         """
         if isinstance(mesh, (str, bytes)) or hasattr(mesh, "__fspath__"):
-            mesh = read_mesh(mesh)  # type: ignore[arg-type]
-        if slot_order not in _SLOT_ORDERS:
-            raise InvalidArgumentError(
-                f'slot_order is "caller" or "hilbert", not {slot_order!r}', reason="BAD_ARGUMENT"
-            )
+            mesh = read_mesh(os.fsdecode(mesh))  # type: ignore[arg-type]
+        order = _SLOT_ORDERS[as_word(slot_order, _SLOT_ORDERS, "slot_order")]
         data = as_mesh_data(mesh, cells, attributes)
         header = sessions_pb2.ImportHeader(
             session=self.name,
-            validate_only=validate_only,
-            request_id=new_request_id(),
-            slot_order=_SLOT_ORDERS[slot_order],
+            validate_only=bool(validate_only),
+            request_id=as_request_id(None),
+            slot_order=order,
         )
         requests = import_requests(header, data)
         with Progress("importing", progress) as bar:
@@ -236,13 +243,13 @@ class Session(SessionChanges):
         """Sends a batch that was collected without a ``with`` block. Parameters as in `edit`."""
         request = edits_pb2.ApplyEditsRequest(
             session=self.name,
-            edits=batch.edits(),
+            edits=as_batch(batch).edits(),
             as_of_revision=as_int64(as_of_revision, "as_of_revision"),
-            if_revision=None if if_revision is None else as_int64(if_revision, "if_revision"),
-            request_id=request_id or new_request_id(),
-            validate_only=validate_only,
-            skip_refused=skip_refused,
-            report_lineage=report_lineage,
+            if_revision=as_revision(if_revision),
+            request_id=as_request_id(request_id),
+            validate_only=bool(validate_only),
+            skip_refused=bool(skip_refused),
+            report_lineage=bool(report_lineage),
             conflict_policy=_conflict_policy(conflict_policy),
         )
         return batch.read(self._caller.unary(self._edits.ApplyEdits, request, timeout, repeatable=True))
@@ -265,9 +272,9 @@ class Session(SessionChanges):
                 session=self.name,
                 edits=batch.edits(),
                 as_of_revision=read_at,
-                request_id=new_request_id(),
-                skip_refused=skip_refused,
-                report_lineage=report_lineage,
+                request_id=as_request_id(None),
+                skip_refused=bool(skip_refused),
+                report_lineage=bool(report_lineage),
                 conflict_policy=policy,
             )
 
@@ -304,42 +311,29 @@ class Session(SessionChanges):
         request = subscriptions_pb2.SubscribeRequest(
             session=self.name,
             codec=_codec(codec),
-            position_bits=_int32(position_bits, "position_bits"),
+            position_bits=as_int64(position_bits, "position_bits", *INT32),
             min_interval_ms=_milliseconds(min_interval),
         )
+        if from_mirror is not None and not isinstance(from_mirror, Mirror):
+            raise bad_argument("from_mirror", f"from_mirror is no mirror: {from_mirror!r}")
+        if on_delta is not None and not callable(on_delta):
+            raise bad_argument("on_delta", f"on_delta cannot be called: {on_delta!r}")
         state = from_mirror.state() if from_mirror else MirrorState()
         return Mirror(self._subscriptions.Subscribe, request, state, on_delta)
 
 
 def _conflict_policy(name: str) -> int:
-    if name in _CONFLICT_POLICIES:
-        return _CONFLICT_POLICIES[name]
-    raise InvalidArgumentError(
-        f'conflict_policy is "ignore" or "touched", not {name!r}',
-        reason="BAD_ARGUMENT",
-        metadata={"field": "conflict_policy"},
-    )
-
-
-def _int32(value: int, what: str) -> int:
-    if -(2**31) <= as_int64(value, what) < 2**31:
-        return int(value)
-    raise InvalidArgumentError(f"{what} is out of range: {value}", reason="BAD_ARGUMENT", metadata={"field": what})
+    return _CONFLICT_POLICIES[as_word(name, _CONFLICT_POLICIES, "conflict_policy")]
 
 
 def _milliseconds(seconds: float) -> int:
-    if not 0 <= seconds <= _MAX_INTERVAL_S:  # NaN too
-        raise InvalidArgumentError(
-            f"min_interval is between 0 and {_MAX_INTERVAL_S} seconds, not {seconds}",
-            reason="BAD_ARGUMENT",
-            metadata={"field": "min_interval"},
-        )
+    if not 0 <= as_number(seconds, "min_interval") <= _MAX_INTERVAL_S:  # NaN too
+        raise bad_argument("min_interval", f"min_interval is from 0 to {_MAX_INTERVAL_S} seconds, not {seconds}")
     return round(seconds * 1000)
 
 
 def _codec(name: str) -> int:
-    if name not in _CODECS:
-        raise InvalidArgumentError(f"a codec is one of {', '.join(_CODECS)}, not {name!r}")
+    as_word(name, _CODECS, "codec")
     if HAS_NATIVE or name == "raw":
         return _CODECS[name]
     if name == "auto":

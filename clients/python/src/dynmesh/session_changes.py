@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import uuid
 from collections.abc import Callable, Iterable
 from typing import Any
 
@@ -10,9 +9,8 @@ import grpc
 
 from ._calls import Caller
 from .adapt import AdaptProgress, AdaptResult, adapt_request, read_adaptation
-from .arrays import as_int64
+from .arguments import as_count, as_request_id, as_revision
 from .edit_result import HistoryResult, history_from_proto
-from .errors import InvalidArgumentError
 from .progress import Progress
 from .repairs import RepairResult, RepairStep, choose_steps, read_repair
 from .session_checks import SessionChecks
@@ -78,9 +76,9 @@ class SessionChanges(SessionChecks):
         request = repairs_pb2.RepairSessionRequest(
             session=self.name,
             steps=[step.to_proto() for step in chosen],
-            if_revision=None if if_revision is None else as_int64(if_revision, "if_revision"),
-            request_id=request_id or new_request_id(),
-            validate_only=validate_only,
+            if_revision=as_revision(if_revision),
+            request_id=as_request_id(request_id),
+            validate_only=bool(validate_only),
         )
         seconds = FOREVER if timeout is None else timeout
         with Progress("repairing", progress) as bar:
@@ -112,9 +110,7 @@ class SessionChanges(SessionChecks):
         FailedPreconditionError
             NOTHING_TO_UNDO: there are fewer than `count`. Nothing is undone then.
         """
-        request = edits_pb2.UndoEditsRequest(
-            **self._history_fields(count, if_revision, request_id), validate_only=validate_only
-        )
+        request = edits_pb2.UndoEditsRequest(**self._history_fields(count, if_revision, request_id, validate_only))
         return self._move(self._edits.UndoEdits, request, timeout)
 
     def redo(
@@ -130,20 +126,21 @@ class SessionChanges(SessionChecks):
 
         A new batch ends it. Parameters as in `undo`; `FailedPreconditionError` NOTHING_TO_REDO.
         """
-        request = edits_pb2.RedoEditsRequest(
-            **self._history_fields(count, if_revision, request_id), validate_only=validate_only
-        )
+        request = edits_pb2.RedoEditsRequest(**self._history_fields(count, if_revision, request_id, validate_only))
         return self._move(self._edits.RedoEdits, request, timeout)
 
     def _move(self, method: Any, request: Any, timeout: float | None) -> HistoryResult:
         return history_from_proto(self._caller.unary(method, request, timeout, repeatable=True))
 
-    def _history_fields(self, count: int, if_revision: int | None, request_id: str | None) -> dict[str, Any]:
+    def _history_fields(
+        self, count: int, if_revision: int | None, request_id: str | None, validate_only: bool
+    ) -> dict[str, Any]:
         return {
             "session": self.name,
-            "count": _count(count),
-            "if_revision": None if if_revision is None else as_int64(if_revision, "if_revision"),
-            "request_id": request_id or new_request_id(),
+            "count": as_count(count, "count"),
+            "if_revision": as_revision(if_revision),
+            "request_id": as_request_id(request_id),
+            "validate_only": bool(validate_only),
         }
 
     def adapt(
@@ -201,16 +198,3 @@ class SessionChanges(SessionChecks):
                 self._adapt.AdaptSession, request, FOREVER if timeout is None else timeout
             )
             return read_adaptation(replies, bar, listen)
-
-
-def new_request_id() -> str:
-    """One that nobody else has."""
-    return uuid.uuid4().hex
-
-
-def _count(value: int) -> int:
-    if 1 <= as_int64(value, "count") < 2**32:
-        return int(value)
-    raise InvalidArgumentError(
-        f"count is at least 1, not {value}", reason="BAD_ARGUMENT", metadata={"field": "count"}
-    )

@@ -10,9 +10,8 @@ from google.protobuf import field_mask_pb2
 from numpy.typing import ArrayLike
 
 from ._calls import Caller
-from .arrays import as_int64
-from .checks import CheckReport, CheckSettings, checks_to_proto, read_report
-from .errors import InvalidArgumentError
+from .arguments import as_int64, as_list, as_text, as_word, bad_argument
+from .checks import CHECKS, CheckReport, CheckSettings, checks_to_proto, read_report
 from .info import SessionInfo, info_from_proto
 from .kinds import KindLike, as_kind
 from .places import box_message
@@ -57,7 +56,7 @@ class SessionChecks(SessionReader):
         """
         settings = sessions_pb2.SessionSettings(checks=checks_to_proto(checks))
         request = sessions_pb2.UpdateSessionRequest(
-            session=sessions_pb2.Session(name=self.name, etag=etag, settings=settings),
+            session=sessions_pb2.Session(name=self.name, etag=as_text(etag, "etag"), settings=settings),
             update_mask=field_mask_pb2.FieldMask(paths=["settings.checks"]),
         )
         # As in store_relations: an update changes the etag.
@@ -100,19 +99,17 @@ class SessionChecks(SessionReader):
         NotFoundError
             ENTITY_REMOVED, UNKNOWN_ENTITY: `ids` that are not live.
         """
-        if not 0 <= as_int64(max_findings, "max_findings") <= _MAX_FINDINGS:
-            raise _bad("max_findings", f"max_findings is from 0 to {_MAX_FINDINGS}, not {max_findings}")
         request = checks_pb2.CheckSessionRequest(
             session=self.name,
             checks=[] if checks is None else checks_to_proto(self._settings_of(checks)),
-            max_findings=max_findings,
+            max_findings=as_int64(max_findings, "max_findings", 0, _MAX_FINDINGS),
             as_of_revision=as_int64(as_of_revision, "as_of_revision"),
         )
         if kind is not None:
             filters = {"boundary_only": bool(boundary_only), "box": None if box is None else box_message(box)}
             _select(request, kind, selections_of(ids, **filters))
         elif ids is not None or boundary_only or box is not None:
-            raise _bad("kind", "ids, boundary_only and box are of a kind, which is not given")
+            raise bad_argument("kind", "ids, boundary_only and box are of a kind, which is not given")
         with Progress("checking", progress) as bar:
             wait = FOREVER if timeout is None else timeout
             return read_report(self._caller.stream(self._checks.CheckSession, request, wait), bar)
@@ -120,7 +117,8 @@ class SessionChecks(SessionReader):
     def _settings_of(self, checks: CheckSettings | Iterable[str]) -> CheckSettings:
         if isinstance(checks, Mapping):
             return _some(checks)
-        names = [checks] if isinstance(checks, str) else list(checks)
+        given = [checks] if isinstance(checks, str) else as_list(checks, "checks")
+        names = [as_word(name, CHECKS, "checks") for name in given]
         present = self.info().checks
         return _some({name: present.get(name, "warn") for name in names})
 
@@ -129,15 +127,11 @@ def _some(checks: CheckSettings) -> CheckSettings:
     """`checks`, unless there are none: on the wire that would mean all."""
     if checks:
         return checks
-    raise _bad("checks", "no check is named")
+    raise bad_argument("checks", "no check is named")
 
 
 def _select(request: checks_pb2.CheckSessionRequest, kind: KindLike, selections: list[Any]) -> None:
     if len(selections) > 1:
-        raise _bad("ids", "ids are too many for one report: ask for ranges, or for all")
+        raise bad_argument("ids", "ids are too many for one report: ask for ranges, or for all")
     request.kind = int(as_kind(kind))
     request.selection.CopyFrom(selections[0])
-
-
-def _bad(field: str, message: str) -> InvalidArgumentError:
-    return InvalidArgumentError(message, reason="BAD_ARGUMENT", metadata={"field": field})

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import os
 from typing import TYPE_CHECKING, Any
 
 import grpc
 from numpy.typing import ArrayLike
 
 from ._calls import Caller
-from .arrays import Ids, Points, as_count, as_int64
+from .arguments import INT32, as_count, as_int64, as_text, bad_argument
+from .arrays import Ids, Points
 from .files import PathLike
 from .info import Counts, SessionInfo, info_from_proto
 from .kinds import KindLike, as_kind
@@ -41,7 +43,7 @@ class SessionReader(PlaceReader):
     """Reads one session. Every method is one call, and every answer speaks of one revision."""
 
     def __init__(self, name: str, channel: grpc.Channel, caller: Caller) -> None:
-        self.name = name
+        self.name = as_text(name, "name")
         self._caller = caller
         self._sessions = sessions_pb2_grpc.SessionServiceStub(channel)
         self._queries = queries_pb2_grpc.QueryServiceStub(channel)
@@ -146,7 +148,8 @@ class SessionReader(PlaceReader):
 
     def boundary_surface(self, position_bits: int = 14, *, timeout: float | None = None) -> Surface:
         """The boundary for viewers, as a Draco mesh with `position_bits` (1-30) for each axis."""
-        request = queries_pb2.GetBoundarySurfaceRequest(session=self.name, position_bits=position_bits)
+        bits = as_int64(position_bits, "position_bits", *INT32)
+        request = queries_pb2.GetBoundarySurfaceRequest(session=self.name, position_bits=bits)
         return read_surface(self._caller.stream(self._queries.GetBoundarySurface, request, timeout))
 
     def snapshot(self, *, progress: bool | None = None, timeout: float | None = None) -> Snapshot:
@@ -179,6 +182,8 @@ class SessionReader(PlaceReader):
         timeout: float | None = None,
     ) -> Snapshot:
         """Writes everything to a file, in the format that its name implies; returns what was written."""
+        if not isinstance(path, (str, os.PathLike)):
+            raise bad_argument("path", f"path is no file name: {path!r}")
         snapshot = self.snapshot(progress=progress, timeout=timeout)
         snapshot.write(path, file_format, slots=slots)
         return snapshot
