@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Ids = NDArray[np.uint32]
 
 TETRAHEDRON, TRIANGLE, QUAD = ElementType.TETRAHEDRON, ElementType.TRIANGLE, ElementType.QUAD
 PYRAMID, PRISM, HEXAHEDRON = ElementType.PYRAMID, ElementType.PRISM, ElementType.HEXAHEDRON

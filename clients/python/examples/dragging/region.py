@@ -6,13 +6,15 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .elements import Floats
 
 # Of a mesh that is not the demo's own: at most so many vertices move, and at most this part of them.
 _MOST_VERTICES = 4000
 _LARGEST_PART = 0.25
+
+_LARGEST_MOVE = 0.2  # of the way on which the pull fades: strains the mesh by 30 %
+_EVERYWHERE = 1e100
 
 
 @dataclass(frozen=True)
@@ -46,12 +48,15 @@ class Region:
         s = np.clip((self.distances(points, centre) - self.inner) / (self.outer - self.inner), 0, 1)
         return 1 - s * s * (3 - 2 * s)
 
-    def within_reach(self, points: Floats) -> NDArray[np.bool_]:
-        """Which points the region can ever pull: bool[n]."""
-        centres = [self.path(t) for t in np.linspace(0, 1, 65)]
-        spacing = max(np.linalg.norm(b - a) for a, b in zip(centres, centres[1:]))
-        nearest = np.min([self.distances(points, centre) for centre in centres], axis=0)
-        return nearest <= self.outer + spacing
+    def box(self, centre: Floats) -> Floats:
+        """Low and high corner of all that it can pull at: float64[2, 3]."""
+        reach = np.where(self.extent > 0, self.outer, _EVERYWHERE)
+        return np.array([centre - reach, centre + reach])
+
+    def moves(self, begin: float, end: float) -> int:
+        """In how many moves a step is to be made, so that each strains the mesh by little."""
+        length = np.linalg.norm(self.path(end) - self.path(begin))
+        return max(1, int(np.ceil(length / (_LARGEST_MOVE * (self.outer - self.inner)))))
 
 
 def hole_region(centre: Floats, radius: float, travel: float) -> Region:

@@ -9,12 +9,12 @@ import dynmesh
 import numpy as np
 
 from .followers import FollowerReport
+from .operators import Outcome
 from .report import Checks, megabytes, milliseconds, part, print_table, rate
 from .simulation import StepReport
 from .survey import Survey
 
 _SIZE_TOLERANCE = 1e-9  # relative
-_HOLE_TOLERANCE = 1e-3  # of the plate's volume: vertices of the rim may be held back now and then
 _MOST_VALIDATED = 300_000  # elements: the server's own validation takes a microsecond for each
 
 
@@ -54,22 +54,26 @@ class Run:
     empty: Memory
     imported: Memory
     steps: list[StepReport] = field(default_factory=list)
+    finish: StepReport | None = None
     wall_s: float = 0.0
+    outcomes: dict[str, Outcome] = field(default_factory=dict)
     followers: list[FollowerReport] = field(default_factory=list)
 
-    @property
-    def items(self) -> int:
-        """Moves, removals and additions of all steps."""
-        return sum(step.items for step in self.steps)
+    def total(self, name: str) -> float:
+        """An attribute of `StepReport`, of all steps and the work at the end."""
+        reports = [*self.steps, *([self.finish] if self.finish else [])]
+        return sum(getattr(report, name) for report in reports)
 
 
-def print_tables(run: Run) -> None:
-    """Entities, memory, the simulation, the followers."""
+def print_tables(run: Run, end: Survey) -> None:
+    """Entities, memory, the simulation with its operators, the followers. `end`: as the session is now."""
     after = run.session.info()
     _print_counts(run.before, after)
     _print_memory(run, after)
+    _print_shapes(run.start, end)
     if run.steps:
         _print_edits(run)
+        _print_operators(run.outcomes)
         _print_followers(run)
 
 
@@ -80,9 +84,10 @@ def check(checks: Checks, run: Run, end: Survey, is_plate: bool) -> None:
         name = follower.plan.name
         checks.add(follower.checksum == after.checksum, f"'{name}' equals the server", f"{follower.checksum}")
         checks.add(follower.refollows == 0, f"'{name}' never had to start over")
-        if is_plate and run.wall_s < len(run.steps) * follower.plan.pause_s:
-            found = f"{follower.deltas} for {len(run.steps)} revisions"
-            checks.add(follower.deltas < len(run.steps), f"'{name}' was sent fewer, larger deltas", found)
+        batches = run.total("batches")
+        if is_plate and run.wall_s < batches * follower.plan.pause_s:
+            found = f"{follower.deltas} for {batches} revisions"
+            checks.add(follower.deltas < batches, f"'{name}' was sent fewer, larger deltas", found)
     exported = run.session.snapshot(progress=False).checksum()
     checks.add(exported == after.checksum, "an export equals the server")
     checks.add(
@@ -95,26 +100,20 @@ def check(checks: Checks, run: Run, end: Survey, is_plate: bool) -> None:
         "the topology is the same",
         f"V-E+F-C = {after.euler_characteristic}",
     )
-    _check_sizes(checks, run, end, is_plate)
+    if is_plate:
+        _check_shapes(checks, run, end)
     if run.start.num_elements <= _MOST_VALIDATED:
         broken = run.session.validate()
         checks.add(not broken, "the server's data structure is sound", "; ".join(broken[:3]))
 
 
-def _check_sizes(checks: Checks, run: Run, end: Survey, is_plate: bool) -> None:
-    """A plate whose hole moved has the volume that it had; other meshes are pulled out of shape."""
-    is_volume = end.kind == dynmesh.EntityKind.CELL
-    if is_volume:
-        error = part(abs(sum(step.size_error for step in run.steps)), run.start.size)
-        found = f"to {error:.0e} of the volume"
-        checks.add(error < _SIZE_TOLERANCE, "what was added fills what was removed", found)
-    what = "volume" if is_volume else "area"
-    found = f"{run.start.size:.9g} became {end.size:.9g}"
-    if is_plate:
-        change = part(abs(end.size - run.start.size), run.start.size)
-        checks.add(change < _HOLE_TOLERANCE, f"the {what} is the same", found)
-    else:
-        print(f"          the {what} {found}")
+def _check_shapes(checks: Checks, run: Run, end: Survey) -> None:
+    """A plate whose hole moved has the volume and angles that it had; other meshes are pulled out of shape."""
+    change = part(abs(end.size - run.start.size), run.start.size)
+    found = f"{run.start.size:.12g} became {end.size:.12g}"
+    checks.add(change < _SIZE_TOLERANCE, "the volume is the same", found)
+    found = f"{run.start.worst_angle:.2f} became {end.worst_angle:.2f} degrees"
+    checks.add(end.worst_angle >= run.start.worst_angle, "the worst dihedral angle is no worse", found)
 
 
 # ---- Tables ----
@@ -145,24 +144,42 @@ def _print_memory(run: Run, after: dynmesh.SessionInfo) -> None:
     print_table("Memory of the daemon", ("", "resident", "bytes/element"), rows)
 
 
-def _print_edits(run: Run) -> None:
-    def total(name: str) -> float:
-        return sum(getattr(step, name) for step in run.steps)
-
-    batches, commit_s = len(run.steps), np.array([step.commit_s for step in run.steps])
+def _print_shapes(start: Survey, end: Survey) -> None:
+    is_volume = end.kind == dynmesh.EntityKind.CELL
+    angle = "worst dihedral angle" if is_volume else "worst angle of a face"
     rows = [
-        ("batches", batches, rate(batches, total("commit_s")), rate(batches, run.wall_s)),
-        ("edits", run.items, rate(run.items, total("commit_s")), rate(run.items, run.wall_s)),
-        ("  moved vertices", total("moved"), "", ""),
-        ("  removed", total("removed"), "", ""),
-        ("  added", total("added"), "", ""),
+        ("elements", start.num_elements, end.num_elements),
+        ("inverted or flat", start.num_inverted, end.num_inverted),
+        ("volume" if is_volume else "area", f"{start.size:.9g}", f"{end.size:.9g}"),
+        (angle, _degrees(start.worst_angle), _degrees(end.worst_angle)),
+    ]
+    print_table("Shape", ("", "before", "after"), rows)
+
+
+def _degrees(angle: float) -> str:
+    return f"{angle:.2f} deg" if np.isfinite(angle) else "-"
+
+
+def _print_edits(run: Run) -> None:
+    rows = [
+        (what, count, rate(count, run.total("commit_s")), rate(count, run.wall_s))
+        for what, count in (("batches", run.total("batches")), ("operations", run.total("operations")))
     ]
     print_table("The simulation", ("", "count", "in commits", "in all"), rows)
-    print(f"  {total('inverted'):,} elements would have inverted; {total('repairs'):,} cavities were emptied")
-    print(f"  and filled anew; {total('held'):,} times a vertex was held back")
-    median, worst = milliseconds(np.median(commit_s)), milliseconds(np.quantile(commit_s, 0.99))
-    print(f"  a commit took {median} (p50), {worst} (p99); queries {total('read_s'):.1f} s, repairs")
-    print(f"  {total('repair_s'):.1f} s, commits {total('commit_s'):.1f} s, in all {run.wall_s:.1f} s")
+    steps_s = [step.total_s for step in run.steps]
+    median, worst = milliseconds(np.median(steps_s)), milliseconds(np.quantile(steps_s, 0.99))
+    print(f"  a step took {median} (p50), {worst} (p99) through RPC; queries {run.total('read_s'):.1f} s, commits")
+    print(f"  {run.total('commit_s'):.1f} s, in all {run.wall_s:.1f} s")
+    print(f"  {run.total('held'):,} times a vertex was held back, as it would have turned an element over")
+
+
+def _print_operators(outcomes: dict[str, Outcome]) -> None:
+    rows = []
+    for name, outcome in outcomes.items():
+        reasons = ", ".join(f"{count:,} {reason}" for reason, count in outcome.reasons.most_common(3))
+        rows.append((name, outcome.asked, outcome.accepted, outcome.asked - outcome.accepted, reasons))
+    header = ("", "asked", "accepted", "refused", "reasons")
+    print_table("Operators (reasons: of the first 100 refusals in a batch)", header, rows)
 
 
 def _print_followers(run: Run) -> None:

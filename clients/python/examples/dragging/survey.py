@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from dynmesh import ElementType, EntityKind, Snapshot
+from dynmesh import ElementType, EntityKind, Session
 
 from .elements import FLIPPED, Floats, Ints, is_cell, qualities, sizes
+
+# Checks that measure the smallest angles of elements, in degrees.
+ANGLE_CHECKS = {EntityKind.CELL: "min_dihedral", EntityKind.FACE: "min_face_angle"}
 
 _AT_ONCE = 1 << 16
 
@@ -29,8 +33,8 @@ class Survey:
         Volume, or area of a surface.
     vertex_ids : int64[n]
     points : float64[n, 3]
-    pinned : int64[p]
-        Ids of vertices that elements of lower dimension hang on.
+    worst_angle : float
+        Degrees: the smallest between two faces of a cell, of surfaces inside of a face; infinity without any.
     """
 
     kind: EntityKind | None
@@ -40,11 +44,12 @@ class Survey:
     size: float
     vertex_ids: Ints
     points: Floats
-    pinned: Ints
+    worst_angle: float
 
 
-def survey(snapshot: Snapshot, flipped: frozenset[ElementType] | None = None) -> Survey:
-    """Measures a snapshot. `flipped`: as an earlier survey found them; default: by majority."""
+def survey(session: Session, flipped: frozenset[ElementType] | None = None) -> Survey:
+    """Measures a session. `flipped`: as an earlier survey found them; default: by majority."""
+    snapshot = session.snapshot(progress=False)
     kind = next((k for k in (EntityKind.CELL, EntityKind.FACE) if snapshot.blocks_of(k)), None)
     positions = np.zeros((int(snapshot.vertex_ids.max(initial=0)) + 1, 3))
     positions[snapshot.vertex_ids] = snapshot.positions
@@ -60,8 +65,15 @@ def survey(snapshot: Snapshot, flipped: frozenset[ElementType] | None = None) ->
         if is_cell(block.type):
             num_inverted += int((_in_parts(qualities, block.type, positions, corners) <= 0).sum())
     ids = snapshot.vertex_ids.astype(np.int64)
-    pinned = _pinned(snapshot, kind)
-    return Survey(kind, frozenset(turned), num_elements, num_inverted, size, ids, snapshot.positions, pinned)
+    worst = _worst_angle(session, kind)
+    return Survey(kind, frozenset(turned), num_elements, num_inverted, size, ids, snapshot.positions, worst)
+
+
+def _worst_angle(session: Session, kind: EntityKind | None) -> float:
+    if kind is None:
+        return math.inf
+    name = ANGLE_CHECKS[kind]
+    return session.check([name], max_findings=0, progress=False)[name].lowest
 
 
 def _in_parts(
@@ -70,9 +82,3 @@ def _in_parts(
     """`measure` of all elements, without copying all their corners at once."""
     parts = [corners[begin : begin + _AT_ONCE] for begin in range(0, len(corners), _AT_ONCE)]
     return np.concatenate([measure(of_type, positions[part]) for part in parts])
-
-
-def _pinned(snapshot: Snapshot, kind: EntityKind | None) -> Ints:
-    lower = [block for block in snapshot.blocks if kind is None or block.type.kind < kind]
-    parts = [block.vertices.ravel() for block in lower]
-    return np.unique(np.concatenate(parts)).astype(np.int64) if parts else np.zeros(0, dtype=np.int64)
