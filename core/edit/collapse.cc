@@ -77,7 +77,7 @@ class LinkCondition {
     work_ += WorkOfLookUp();
     const EdgeId of_kept = edges_of_kept_.To(c);
     if (!of_kept.valid()) return absl::OkStatus();
-    const FaceId between = mesh_.FindFace({kept_, gone_, c});
+    const FaceId between = FindAt(of_gone, {kept_, gone_, c});
     const auto refuse = [&](absl::string_view why) {
       return Refuse(reason::kLinkCondition, absl::StrCat("vertex ", c.slot(), " ", why), EntityKind::kVertex,
                     {c.slot()});
@@ -101,7 +101,10 @@ class LinkCondition {
     if (!AreNeighborsJoined(vertices)) return absl::OkStatus();
     std::array<VertexId, kMaxFaceVertices> moved;
     std::replace_copy(vertices.begin(), vertices.end(), moved.begin(), gone_, kept_);
-    const FaceId of_kept = Find(absl::MakeConstSpan(moved.data(), vertices.size()));
+    const size_t at = std::find(vertices.begin(), vertices.end(), gone_) - vertices.begin();
+    const VertexId beside = vertices[(at + 1) % vertices.size()];
+    const FaceId of_kept =
+        FindAt(edges_of_kept_.To(beside), absl::MakeConstSpan(moved.data(), vertices.size()));
     if (!of_kept.valid()) return absl::OkStatus();
     for (CellId c : mesh_.IncidentCells(of_gone)) {
       ++work_;
@@ -129,6 +132,18 @@ class LinkCondition {
       if (triangle.valid()) return RefuseMerger(quad, triangle);
     }
     return absl::OkStatus();
+  }
+
+  /// The face of these vertices, one of whose edges is known.
+  FaceId FindAt(EdgeId of_face, absl::Span<const VertexId> cycle) const {
+    constexpr size_t kFew = 32;  // the mesh has better ways to find one among many
+    const auto faces = mesh_.IncidentFaces(of_face);
+    if (faces.size() > kFew || mesh_.HasDuplicates(EntityKind::kEdge)) return Find(cycle);
+    work_ += faces.size();
+    for (FaceId f : faces) {
+      if (!mesh_.IsDuplicate(f) && MatchFace(mesh_.Vertices(f), cycle)) return f;
+    }
+    return FaceId();
   }
 
   FaceId Find(absl::Span<const VertexId> cycle) const {
@@ -196,7 +211,7 @@ class TwinCheck {
       const bool is_new =
           std::any_of(span.begin(), span.end(), [](VertexId v) { return v.slot() & kNewVertex; });
       if (is_new || Contains(span, kept_)) continue;
-      const FaceId f = FaceOf(parent, span);
+      const FaceId f = FaceOf(parent, i, span);
       if (!f.valid()) return CellId();
       work += mesh_.IncidentCells(f).size();
       return TwinAt(f, element, parent);
@@ -204,9 +219,11 @@ class TwinCheck {
     return CellId();
   }
 
-  /// The face with these vertices, which most likely is one of the parent's.
-  FaceId FaceOf(CellId parent, absl::Span<const VertexId> vertices) const {
-    for (OrientedFace oriented : mesh_.Faces(parent)) {
+  /// The face with these vertices, which most likely is one of the parent's, and the i-th.
+  FaceId FaceOf(CellId parent, size_t i, absl::Span<const VertexId> vertices) const {
+    const auto faces = mesh_.Faces(parent);
+    if (i < faces.size() && MatchFace(mesh_.Vertices(faces[i].face()), vertices)) return faces[i].face();
+    for (OrientedFace oriented : faces) {
       if (MatchFace(mesh_.Vertices(oriented.face()), vertices)) return oriented.face();
     }
     return mesh_.FindFace(vertices);
@@ -222,7 +239,9 @@ class TwinCheck {
     const auto ours = element.vertices();
     for (CellId c : mesh_.IncidentCells(f)) {
       const auto theirs = mesh_.Vertices(c);
-      const bool shrinks = Contains(theirs, gone_) && Contains(theirs, kept_);
+      const bool has_gone = Contains(theirs, gone_), has_kept = Contains(theirs, kept_);
+      if (!has_gone && !has_kept) continue;  // which nearly all are
+      const bool shrinks = has_gone && has_kept;
       if (c == parent || mesh_.Type(c) != element.type || shrinks || AreEqual(c, parent)) continue;
       std::array<VertexId, kMaxElementVertices> moved;
       const auto end = std::replace_copy(theirs.begin(), theirs.end(), moved.begin(), gone_, kept_);

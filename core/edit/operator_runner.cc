@@ -197,10 +197,14 @@ absl::Status OperatorRunner::Run(const SmoothVerticesEdit& edit) {
   return absl::OkStatus();
 }
 
-/// A collapse needs the star of the vertex that goes: most often the second one.
+/// A collapse needs the star of the vertex that goes, most often the second one, and the edges of the other.
 void OperatorRunner::PrefetchEnd(EdgeId e, int stage) const {
+  constexpr int kStagesOfEdges = 4;
   if (stage == 0) return mesh_.PrefetchStar(e, 0);
-  if (mesh_.IsLive(e)) mesh_.PrefetchStar(mesh_.Vertices(e)[1], stage - 1);
+  if (!mesh_.IsLive(e)) return;
+  const auto ends = mesh_.Vertices(e);
+  mesh_.PrefetchStar(ends[1], stage - 1);
+  if (stage <= kStagesOfEdges) mesh_.PrefetchStar(ends[0], stage - 1);
 }
 
 absl::Status OperatorRunner::RunAll(const Items& items, const PatchLimits& limits, Plan plan) {

@@ -11,6 +11,12 @@ namespace dynmesh {
 struct Mesh::CellParts {
   std::array<EdgeId, kMaxElementEdges> edges;
   std::array<FaceMatch, kMaxElementFaces> faces;
+
+  /// Names the edges of the i-th face, which was found and has `of_face`.
+  void TakeEdges(const ElementTemplate& shape, int i, absl::Span<const EdgeId> of_face) {
+    const int n = static_cast<int>(of_face.size());
+    for (int k = 0; k < n; ++k) edges[shape.faces[i].edges[k]] = of_face[faces[i].code.StoredEdge(k, n)];
+  }
 };
 
 }  // namespace dynmesh

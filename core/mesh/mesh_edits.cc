@@ -166,11 +166,7 @@ void Mesh::FindCellParts(const ElementTemplate& shape, VertexSpan vertices, cons
   }
   for (int i = 0; i < shape.num_faces; ++i) {
     parts.faces[i] = FindCellFace(shape, i, vertices, parts);
-    if (!parts.faces[i].face.valid()) continue;
-    const auto edges = Edges(parts.faces[i].face);
-    for (size_t k = 0; k < edges.size(); ++k) {
-      parts.edges[shape.faces[i].edges[k]] = edges[parts.faces[i].code.StoredEdge(k, edges.size())];
-    }
+    if (parts.faces[i].face.valid()) parts.TakeEdges(shape, i, Edges(parts.faces[i].face));
   }
 }
 

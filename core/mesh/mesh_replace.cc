@@ -10,8 +10,8 @@
 namespace dynmesh {
 namespace {
 
-constexpr size_t kTypicalCells = 16;  ///< in place of those round an edge
-constexpr size_t kTypicalFaces = 32;
+constexpr size_t kTypicalCells = 32;  ///< in place of those round an edge or a vertex
+constexpr size_t kTypicalFaces = 64;
 
 /// Edges, faces and cells of elements, as if they shared none.
 std::array<uint32_t, kNumEntityKinds> PartsOf(absl::Span<const NewElement> elements) {
@@ -47,6 +47,7 @@ absl::Status Mesh::ReplaceElements(absl::Span<const EntityId> removed, absl::Spa
       DestroyCell(CellId(id.slot));
     } else if (id.kind == EntityKind::kFace) {
       nearby.Gather(FaceId(id.slot));
+      nearby.GatherEdges(FaceId(id.slot));
       faces.push_back(FaceId(id.slot));
       ClearElementFlag(id);
     } else {
@@ -88,7 +89,9 @@ absl::StatusOr<EntityId> Mesh::AddFaceNear(VertexSpan vertices, Nearby& nearby) 
     is_new |= match.is_new;
   }
   const FaceEdges found = edges;
-  const FaceMatch match = nearby.FindFace(vertices, absl::MakeConstSpan(edges.data(), n), is_new);
+  FaceMatch match = nearby.FindFace(vertices);
+  if (!match.face.valid() && !is_new)
+    match = FindFaceAround(LeastUsed(absl::MakeConstSpan(edges.data(), n)), vertices);
   DYNMESH_ASSIGN_OR_RETURN(const EntityId id, AddFaceElement(vertices, edges, match));
   for (size_t k = 0; k < n; ++k) {
     if (!found[k].valid()) nearby.AddNew(edges[k]);
@@ -100,26 +103,10 @@ absl::StatusOr<EntityId> Mesh::AddFaceNear(VertexSpan vertices, Nearby& nearby) 
 absl::StatusOr<EntityId> Mesh::AddCellNear(ElementType type, VertexSpan vertices, Nearby& nearby) {
   const ElementTemplate& shape = TemplateOf(type);
   CellParts parts;
-  uint32_t missing_edges = 0, new_edges = 0, missing_faces = 0;  // a bit for each
-  for (int e = 0; e < shape.num_edges; ++e) {
-    const LocalEdge& ends = shape.edges[e];
-    const auto match = nearby.FindEdge(vertices[ends.vertices[0]], vertices[ends.vertices[1]]);
-    parts.edges[e] = match.edge;
-    missing_edges |= uint32_t{!match.edge.valid()} << e;
-    new_edges |= uint32_t{match.is_new} << e;
-  }
-  for (int i = 0; i < shape.num_faces; ++i) {
-    const LocalFace& face = shape.faces[i];
-    FaceEdges edges;
-    uint32_t mask = 0;
-    for (int k = 0; k < face.size; ++k) {
-      edges[k] = parts.edges[face.edges[k]];
-      mask |= uint32_t{1} << face.edges[k];
-    }
-    parts.faces[i] = nearby.FindFace(FaceVertices(face, vertices).span(),
-                                     absl::MakeConstSpan(edges.data(), face.size), (mask & new_edges) != 0);
-    missing_faces |= uint32_t{!parts.faces[i].face.valid()} << i;
-  }
+  nearby.FindParts(shape, vertices, parts);
+  uint32_t missing_edges = 0, missing_faces = 0;  // a bit for each
+  for (int e = 0; e < shape.num_edges; ++e) missing_edges |= uint32_t{!parts.edges[e].valid()} << e;
+  for (int i = 0; i < shape.num_faces; ++i) missing_faces |= uint32_t{!parts.faces[i].face.valid()} << i;
   DYNMESH_ASSIGN_OR_RETURN(const EntityId id, AddCell(type, vertices, parts));
   for (; missing_edges != 0; missing_edges &= missing_edges - 1) {
     nearby.AddNew(parts.edges[std::countr_zero(missing_edges)]);

@@ -9,7 +9,7 @@
 
 #include "absl/container/flat_hash_map.h"
 #include "absl/container/inlined_vector.h"
-#include "core/mesh/checksum.h"
+#include "core/mesh/cell_parts.h"
 #include "core/mesh/mesh.h"
 
 namespace dynmesh {
@@ -50,8 +50,8 @@ class NearTable {
   }
 
  private:
-  static constexpr size_t kFew = 64;
-  static constexpr size_t kPlaces = 2 * kFew;
+  static constexpr size_t kFew = 192;  ///< the parts of nearly all stars, and of what takes their place
+  static constexpr size_t kPlaces = 512;
 
   static size_t PlaceOf(uint64_t key) { return (key * 0x9e3779b97f4a7c15u >> 32) % kPlaces; }
 
@@ -89,21 +89,20 @@ class Mesh::Nearby {
  public:
   explicit Nearby(const Mesh& mesh) : mesh_(mesh) {}
 
-  /// Adds an entity of the mesh with what is below it; a duplicate is left out. Whether it was not there yet.
+  /// Adds a face of the mesh; a duplicate is left out. Whether it was not there yet.
   bool Gather(FaceId f) {
-    const auto vertices = mesh_.Vertices(f);
-    const uint64_t key = KeyOf(vertices);
+    const uint64_t key = KeyOf(mesh_.Vertices(f));
     const bool known = faces_.Find(key, [f](Slot other) { return other == f.slot(); }) != nullptr;
     if (known || mesh_.IsDuplicate(f)) return false;
     faces_.Add({key, f.slot(), false});
-    for (EdgeId e : mesh_.Edges(f)) Gather(e);
     return true;
   }
-  bool Gather(EdgeId e) {
-    const uint64_t key = KeyOf(mesh_.Vertices(e)[0], mesh_.Vertices(e)[1]);
-    if (edges_.Find(key, Any) != nullptr || mesh_.IsDuplicate(e)) return false;
-    edges_.Add({key, e.slot(), false});
-    return true;
+  /// Adds its edges. Cells find theirs by their faces, and do not need that.
+  void GatherEdges(FaceId f) {
+    for (EdgeId e : mesh_.Edges(f)) {
+      const uint64_t key = KeyOf(mesh_.Vertices(e)[0], mesh_.Vertices(e)[1]);
+      if (edges_.Find(key, Any) == nullptr && !mesh_.IsDuplicate(e)) edges_.Add({key, e.slot(), false});
+    }
   }
 
   /// Adds what was just made.
@@ -121,15 +120,23 @@ class Mesh::Nearby {
     return {e, !e.valid()};
   }
 
-  /// The face with these vertices. `edges` are its edges, `is_new` whether one of them is.
-  FaceMatch FindFace(VertexSpan vertices, absl::Span<const EdgeId> edges, bool is_new) const {
-    absl::optional<FaceCode> code;
-    const auto* known = faces_.Find(KeyOf(vertices), [&](Slot slot) {
-      code = MatchFace(mesh_.Vertices(FaceId(slot)), vertices);
-      return code.has_value();
-    });
-    if (known != nullptr) return {FaceId(known->slot), *code};
-    return is_new ? FaceMatch() : mesh_.FindFaceAround(mesh_.LeastUsed(edges), vertices);
+  /// The face with these vertices, if it is known here.
+  FaceMatch FindFace(VertexSpan vertices) const { return FindFace(vertices, KeyOf(vertices)); }
+
+  /// Edges and faces of a new cell; those that are neither known here nor in the mesh stay invalid.
+  void FindParts(const ElementTemplate& shape, VertexSpan cell, CellParts& parts) {
+    FindFaces(shape, cell, parts);
+    uint32_t new_edges = 0;  // a bit for each
+    for (int e = 0; e < shape.num_edges; ++e) {
+      if (parts.edges[e].valid()) continue;
+      const LocalEdge& ends = shape.edges[e];
+      const EdgeMatch match = FindEdge(cell[ends.vertices[0]], cell[ends.vertices[1]]);
+      parts.edges[e] = match.edge;
+      new_edges |= uint32_t{match.is_new} << e;
+    }
+    for (int i = 0; i < shape.num_faces; ++i) {
+      if (!parts.faces[i].face.valid()) parts.faces[i] = FindFarFace(shape.faces[i], cell, parts, new_edges);
+    }
   }
 
  private:
@@ -139,11 +146,48 @@ class Mesh::Nearby {
     return uint64_t{std::min(a, b).slot()} << 32 | std::max(a, b).slot();
   }
 
-  /// Equal cycles have equal sums: hardly any others do.
+  /// Equal cycles have equal sums of terms: hardly any others do.
   static uint64_t KeyOf(VertexSpan vertices) {
     uint64_t key = 0;
-    for (VertexId v : vertices) key += Checksum::Mix(v.slot());
+    for (VertexId v : vertices) key += TermOf(v);
     return key;
+  }
+  static uint64_t TermOf(VertexId v) {
+    const uint64_t term = (v.slot() + uint64_t{1}) * 0x9e3779b97f4a7c15u;
+    return (term ^ term >> 32) * 0xd6e8feb86659fd93u;
+  }
+
+  FaceMatch FindFace(VertexSpan vertices, uint64_t key) const {
+    absl::optional<FaceCode> code;
+    const auto* known = faces_.Find(key, [&](Slot slot) {
+      code = MatchFace(mesh_.Vertices(FaceId(slot)), vertices);
+      return code.has_value();
+    });
+    return known != nullptr ? FaceMatch{FaceId(known->slot), *code} : FaceMatch();
+  }
+
+  /// The faces of a new cell that are known here, and their edges.
+  void FindFaces(const ElementTemplate& shape, VertexSpan cell, CellParts& parts) const {
+    std::array<uint64_t, kMaxElementVertices> terms;
+    for (size_t k = 0; k < cell.size(); ++k) terms[k] = TermOf(cell[k]);
+    for (int i = 0; i < shape.num_faces; ++i) {
+      uint64_t key = 0;
+      for (int k = 0; k < shape.faces[i].size; ++k) key += terms[shape.faces[i].vertices[k]];
+      parts.faces[i] = FindFace(FaceVertices(shape.faces[i], cell).span(), key);
+      if (parts.faces[i].face.valid()) parts.TakeEdges(shape, i, mesh_.Edges(parts.faces[i].face));
+    }
+  }
+
+  /// A face that is not known here, and so has no new edge, if the mesh has it.
+  FaceMatch FindFarFace(const LocalFace& face, VertexSpan cell, const CellParts& parts,
+                        uint32_t new_edges) const {
+    FaceEdges edges;
+    for (int k = 0; k < face.size; ++k) {
+      if (new_edges >> face.edges[k] & 1) return {};
+      edges[k] = parts.edges[face.edges[k]];
+    }
+    return mesh_.FindFaceAround(mesh_.LeastUsed(absl::MakeConstSpan(edges.data(), face.size)),
+                                FaceVertices(face, cell).span());
   }
 
   const Mesh& mesh_;

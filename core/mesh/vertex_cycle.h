@@ -21,13 +21,17 @@ struct FaceCode {
   constexpr int rotation() const { return value & 3; }
   constexpr bool flipped() const { return value & 4; }
   /// Position in the stored face of the key's vertex k.
-  constexpr int StoredVertex(int k, int n) const { return (rotation() + (flipped() ? n - k : k)) % n; }
+  constexpr int StoredVertex(int k, int n) const { return Wrap(rotation() + (flipped() ? n - k : k), n); }
   /// Position in the stored face of the key's edge k, which joins key vertices k and k + 1.
-  constexpr int StoredEdge(int k, int n) const { return (rotation() + (flipped() ? n - k - 1 : k)) % n; }
+  constexpr int StoredEdge(int k, int n) const { return Wrap(rotation() + (flipped() ? n - k - 1 : k), n); }
   /// The code by which the stored face lies in the key.
   constexpr FaceCode Inverse(int n) const {
-    return flipped() ? *this : FaceCode{static_cast<uint8_t>((n - rotation()) % n)};
+    return flipped() ? *this : FaceCode{static_cast<uint8_t>(Wrap(n - rotation(), n))};
   }
+
+ private:
+  /// k mod n of a k below 2n: divisions are slow.
+  static constexpr int Wrap(int k, int n) { return k < n ? k : k - n; }
 };
 
 /// Vertices of one face of a cell, in the template's outward order.
