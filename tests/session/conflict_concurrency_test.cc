@@ -1,8 +1,11 @@
 // Editors that read, think and write at the same time, each in a region of its own choice, with
 // ConflictPolicy::kTouched. Meant for ThreadSanitizer, and true without it.
+//
+// DYNMESH_EDITOR_BATCHES: how many each editor makes (default 120).
 
 #include <algorithm>
 #include <barrier>
+#include <cstdlib>
 #include <cstring>
 #include <thread>
 
@@ -14,9 +17,13 @@
 namespace dynmesh::testing {
 namespace {
 
-constexpr int kBatchesEach = 120;
 constexpr int kMaxTries = 100'000;  ///< of one batch: far beyond what is fair
 const AttributeSpec kCount = {"count", EntityKind::kVertex, AttributeType::kInt32, 1};
+
+int NumBatches() {
+  const char* batches = std::getenv("DYNMESH_EDITOR_BATCHES");
+  return batches != nullptr ? std::atoi(batches) : 120;
+}
 
 int32_t CountAt(const Mesh& mesh, Slot vertex) {
   int32_t count;
@@ -36,7 +43,8 @@ class CountingEditor {
       : session_(session), region_(region), all_have_read_(all_have_read), rng_(seed) {}
 
   void Run() {
-    for (int batch = 0; batch < kBatchesEach; ++batch) {
+    const int batches = NumBatches();
+    for (int batch = 0; batch < batches; ++batch) {
       tries_ = 0;
       while (!TryBatch()) {
         if (++tries_ < kMaxTries) continue;
@@ -178,7 +186,8 @@ class ConflictConcurrencyTest : public ::testing::TestWithParam<int> {
 TEST_P(ConflictConcurrencyTest, InOverlappingRegionsNoUpdateIsLost) {
   const int num_refusals = Run(std::vector<CountingEditor::Region>(GetParam(), {0, 16}));
   EXPECT_GT(num_refusals, 0);
-  EXPECT_EQ(session_->revision(), 2 + GetParam() * kBatchesEach) << "each accepted batch is one revision";
+  EXPECT_EQ(session_->revision(), 2 + int64_t{GetParam()} * NumBatches())
+      << "each accepted batch is one revision";
 }
 
 INSTANTIATE_TEST_SUITE_P(Editors, ConflictConcurrencyTest, ::testing::Values(2, 4));
@@ -191,7 +200,7 @@ TEST_F(ConflictConcurrencyTest, UndoingAndEditingAtOnceLeavesASoundMesh) {
   CountingEditor editor(*session_, {0, 16}, alone, 7);
   threads.emplace_back([&] { editor.Run(); });
   threads.emplace_back([&] {
-    for (int i = 0; i < kBatchesEach; ++i) {
+    for (int i = 0, batches = NumBatches(); i < batches; ++i) {
       const HistoryMove move = i % 3 == 2 ? HistoryMove::kRedo : HistoryMove::kUndo;
       const auto moved = session_->MoveInHistory(move, {.validate_only = i % 2 == 0});
       if (!moved.ok()) {
