@@ -25,6 +25,9 @@
 #include "core/mesh/ids.h"
 #include "core/mesh/incidence_lists.h"
 #include "core/mesh/journal.h"
+#include "core/mesh/mesh_options.h"
+#include "core/mesh/new_element.h"
+#include "core/mesh/oriented_face.h"
 #include "core/mesh/slots.h"
 #include "core/mesh/stamps.h"
 #include "core/mesh/stored_relations.h"
@@ -33,55 +36,8 @@
 
 namespace dynmesh {
 
-/// A face of a cell with its orientation code, in 32 bits: hence at most 2^29 - 1 faces.
-class OrientedFace {
- public:
-  constexpr OrientedFace() = default;
-  constexpr OrientedFace(FaceId face, FaceCode code) : packed_(face.slot() << 3 | code.value) {}
-
-  constexpr FaceId face() const { return FaceId(packed_ >> 3); }
-  constexpr FaceCode code() const { return FaceCode{static_cast<uint8_t>(packed_ & 7)}; }
-  /// The 32 bits.
-  constexpr uint32_t packed() const { return packed_; }
-  static constexpr OrientedFace FromPacked(uint32_t packed) {
-    OrientedFace oriented;
-    oriented.packed_ = packed;
-    return oriented;
-  }
-
- private:
-  uint32_t packed_ = kNoSlot;
-};
-
-/// An element that is to be added.
-struct NewElement {
-  /// REQUIRES: vertices.size() == NumVertices(element_type).
-  NewElement(ElementType element_type, absl::Span<const VertexId> vertices) : type(element_type) {
-    std::copy(vertices.begin(), vertices.end(), ids.begin());
-  }
-  absl::Span<const VertexId> vertices() const { return absl::MakeConstSpan(ids.data(), NumVertices(type)); }
-  absl::Span<VertexId> mutable_vertices() { return absl::MakeSpan(ids.data(), NumVertices(type)); }
-
-  ElementType type;
-  std::array<VertexId, kMaxElementVertices> ids;
-};
-
-enum class DuplicatePolicy { kKeep, kRefuse };
-
 /// Slots of each kind.
 using EntitySlots = std::array<std::vector<Slot>, kNumEntityKinds>;
-
-/// Upper bounds on slots ever used, for each kind; beyond: RESOURCE_EXHAUSTED. An element is let in only if
-/// there is room for all its faces and edges, as if none of them existed.
-struct MeshLimits {
-  /// Vertex ids stay below 2^31 (edit batches use the top bit), faces below 2^29 (OrientedFace).
-  std::array<uint32_t, kNumEntityKinds> max_slots = {0x7fffffffu, 0x7fffffffu, 0x1fffffffu, 0x7fffffffu};
-};
-
-struct MeshOptions {
-  DuplicatePolicy duplicates = DuplicatePolicy::kKeep;
-  MeshLimits limits;
-};
 
 /// A dynamic mesh of vertices, edges, faces and cells of every kind, manifold or not.
 ///
