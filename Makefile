@@ -20,7 +20,7 @@ demo: configure
 
 test: configure
 	@cmake --build --preset dev -j $(JOBS)
-	@ctest --preset dev
+	@ctest --preset dev -j $(JOBS)
 
 configure:
 	@scripts/setup.sh build test

@@ -6,8 +6,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <iterator>
+#include <limits>
 #include <new>
 
 #include "absl/strings/str_cat.h"
@@ -22,14 +22,14 @@ using draco::FaceIndex;
 using draco::PointIndex;
 using Triangle = std::array<uint32_t, 3>;
 
-constexpr int kSpeed = 5;
+constexpr int kSurfaceSpeed = 5;
 constexpr int kMaxPositionBits = 30;
 constexpr int kFloatBits = 24;  // what float32 holds; Draco's time and memory double with each bit
 // Draco takes memory and time in proportion to the largest difference of an integer attribute, so slots
 // from here on travel as two components, the low and the high 16 bits.
 constexpr Slot kFirstWideSlot = 1u << 20;
-constexpr int kLowBits = 16;
-constexpr uint32_t kLowMask = (1u << kLowBits) - 1;
+constexpr int kLowSlotBits = 16;
+constexpr uint32_t kLowSlotMask = (1u << kLowSlotBits) - 1;
 
 absl::Status DracoError(const draco::Status& status) {
   return MakeError(absl::StatusCode::kInternal, reason::kInternal, status.error_msg_string());
@@ -119,7 +119,7 @@ void AddSlots(const std::vector<VertexId>& slots, draco::Mesh& mesh) {
   const int id = mesh.AddAttribute(attribute, true, slots.size());
   for (uint32_t v = 0; v < slots.size(); ++v) {
     const Slot slot = slots[v].slot();
-    const uint32_t value[] = {wide ? slot & kLowMask : slot, slot >> kLowBits};
+    const uint32_t value[] = {wide ? slot & kLowSlotMask : slot, slot >> kLowSlotBits};
     mesh.attribute(id)->SetAttributeValue(AttributeValueIndex(v), value);
   }
 }
@@ -139,7 +139,7 @@ absl::StatusOr<std::string> EncodeMesh(const TriangleSurface& surface, int posit
   AddSlots(surface.vertex_slots, mesh);
   AddTriangles(surface.triangles, mesh);
   draco::ExpertEncoder encoder(mesh);
-  encoder.SetSpeedOptions(kSpeed, kSpeed);
+  encoder.SetSpeedOptions(kSurfaceSpeed, kSurfaceSpeed);
   encoder.SetEncodingMethod(draco::MESH_EDGEBREAKER_ENCODING);
   encoder.SetAttributeQuantization(positions, std::min(position_bits, kFloatBits));
   draco::EncoderBuffer buffer;
@@ -151,7 +151,7 @@ absl::StatusOr<std::string> EncodeMesh(const TriangleSurface& surface, int posit
 Slot ReadSlot(const draco::PointAttribute& attribute, PointIndex point) {
   uint32_t value[2] = {0, 0};
   attribute.GetMappedValue(point, value);
-  return attribute.num_components() == 1 ? value[0] : value[1] << kLowBits | (value[0] & kLowMask);
+  return attribute.num_components() == 1 ? value[0] : value[1] << kLowSlotBits | (value[0] & kLowSlotMask);
 }
 
 bool IsSlotAttribute(const draco::PointAttribute* attribute) {

@@ -13,7 +13,7 @@ namespace {
 /// Steps of one climb: each judges the star up to seven times.
 constexpr int kMaxSteps = 24;
 
-double Length(const Point& p) { return std::sqrt(Dot(p, p)); }
+double Norm(const Point& p) { return std::sqrt(Dot(p, p)); }
 
 VertexId OtherEnd(const Mesh& mesh, EdgeId e, VertexId v) {
   const auto ends = mesh.Vertices(e);
@@ -49,7 +49,7 @@ bool IsSharp(const Mesh& mesh, VertexId v, const Point& normal) {
   constexpr double kCosine = 0.766;
   bool sharp = false;
   ForEachSurfaceFace(mesh, v, [&](const Point& area) {
-    sharp = sharp || std::abs(Dot(normal, area)) < kCosine * Length(normal) * Length(area);
+    sharp = sharp || std::abs(Dot(normal, area)) < kCosine * Norm(normal) * Norm(area);
   });
   return sharp;
 }
@@ -152,7 +152,7 @@ absl::optional<Point> MeanOfNeighbours(const Mesh& mesh, VertexId v) {
 double MeanLengthOfEdges(const Mesh& mesh, VertexId v) {
   const auto edges = mesh.IncidentEdges(v);
   double sum = 0;
-  for (EdgeId e : edges) sum += Length(mesh.Position(OtherEnd(mesh, e, v)) - mesh.Position(v));
+  for (EdgeId e : edges) sum += Norm(mesh.Position(OtherEnd(mesh, e, v)) - mesh.Position(v));
   return edges.empty() ? 0 : sum / static_cast<double>(edges.size());
 }
 
@@ -163,7 +163,7 @@ Freedom Freedom::Along(const Mesh& mesh, VertexId v) {
   const Kind kind = solid || inside ? Kind::kPlane : Kind::kLine;
   const Point along = kind == Kind::kPlane ? NormalAt(mesh, v) : DirectionOfBoundary(mesh, v);
   if (kind == Kind::kPlane && IsSharp(mesh, v, along)) return Freedom(Kind::kNone, {0, 0, 0});
-  const double length = Length(along);
+  const double length = Norm(along);
   return length > 0 ? Freedom(kind, (1 / length) * along) : Freedom();
 }
 

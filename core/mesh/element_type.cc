@@ -150,7 +150,7 @@ constexpr bool HitsFaces(const ElementTemplate& t, unsigned edges) {
   return true;
 }
 
-constexpr unsigned BitSet(const uint8_t* items, int count) {
+constexpr unsigned BitsOf(const uint8_t* items, int count) {
   unsigned bits = 0;
   for (int i = 0; i < count; ++i) bits |= 1u << items[i];
   return bits;
@@ -175,8 +175,8 @@ constexpr bool IsSmallest(const ElementTemplate& t, unsigned chosen, int size,
 constexpr bool Consistent(ElementType type) {
   const ElementTemplate& t = internal::kElementTemplates[static_cast<int>(type)];
   return t.type == type && FacesUseCellEdges(t) && ClosedAndOriented(t) &&
-         IsSmallest(t, BitSet(t.smart_edges, t.num_smart_edges), t.num_edges, HitsFaces) &&
-         IsSmallest(t, BitSet(t.smart_vertices, t.num_smart_vertices), t.num_vertices, Covers);
+         IsSmallest(t, BitsOf(t.smart_edges, t.num_smart_edges), t.num_edges, HitsFaces) &&
+         IsSmallest(t, BitsOf(t.smart_vertices, t.num_smart_vertices), t.num_vertices, Covers);
 }
 
 static_assert(Consistent(ElementType::kWireEdge));

@@ -5,7 +5,7 @@
 namespace dynmesh {
 namespace {
 
-constexpr uint32_t kFew = 1000;
+constexpr uint32_t kFewestRows = 1000;
 constexpr Relation kVertexFaces = {EntityKind::kVertex, EntityKind::kFace};
 constexpr uint64_t kMaxEntries = uint64_t{1} << 31;
 
@@ -59,7 +59,7 @@ bool InverseRows::Pays(const Mesh& mesh, Relation relation) {
   const bool vertices = relation.from == EntityKind::kVertex && relation.to == EntityKind::kVertex;
   const EntityKind walked = vertices ? EntityKind::kEdge : relation.to;
   const uint64_t most = uint64_t{mesh.NumLive(walked)} * kMaxElementEdges;
-  return (upward || vertices) && mesh.NumLive(relation.from) >= kFew && most < kMaxEntries;
+  return (upward || vertices) && mesh.NumLive(relation.from) >= kFewestRows && most < kMaxEntries;
 }
 
 InverseRows::InverseRows(const Mesh& mesh, Relation relation) {

@@ -12,7 +12,7 @@ namespace dynmesh {
 namespace {
 
 /// Fewer elements stay in the order they came: sorting would cost more than it gives.
-constexpr size_t kFew = 32;
+constexpr size_t kFewElements = 32;
 
 /// Journal entries for each element of a batch: of a tetrahedron in the middle of others, itself, two faces
 /// and little more than an edge.
@@ -29,7 +29,7 @@ absl::Status WithIndex(const absl::Status& status, size_t index) {
 /// A sample decides.
 bool AreScattered(size_t count, absl::FunctionRef<absl::Span<const VertexId>(size_t)> element) {
   constexpr size_t kSample = 128;
-  if (count < kFew) return false;
+  if (count < kFewElements) return false;
   size_t sharing = 0, pairs = 0;
   for (size_t k = 0; k + 1 < count; k += std::max<size_t>(1, count / kSample), ++pairs) {
     const auto next = element(k + 1);
@@ -57,7 +57,7 @@ absl::Status Mesh::AddElements(ElementType type, absl::Span<const VertexId> vert
     const absl::Status checked = CheckVertices(type, vertices.subspan(i * size, size));
     if (!checked.ok()) return WithIndex(checked, i);
   }
-  const Permutation order = count < kFew ? Permutation() : OrderOfElements(vertices, size);
+  const Permutation order = count < kFewElements ? Permutation() : OrderOfElements(vertices, size);
   const auto index = [&](size_t k) { return order.empty() ? k : order[k]; };
   const auto element = [&](size_t k) { return vertices.subspan(index(k) * size, size); };
   if (journaling()) journal_.Expect(count * kTypicalEntries);

@@ -10,7 +10,7 @@ namespace dynmesh {
 namespace {
 
 /// Larger stars are not asked for: they would only push out each other.
-constexpr size_t kManyFaces = 16;
+constexpr size_t kLargestStar = 16;
 
 }  // namespace
 
@@ -50,7 +50,7 @@ void Mesh::PrefetchStar(EdgeId e, int stage) const {
   if (!IsLive(e)) return;
   if (stage < 2) return PrefetchEdge(e, stage);
   const auto faces = IncidentFaces(e);
-  if (faces.size() > kManyFaces) return;
+  if (faces.size() > kLargestStar) return;
   for (FaceId f : faces) stage == 2 ? PrefetchFace(f) : PrefetchStar(f, stage - 2);
 }
 
@@ -77,14 +77,14 @@ void Mesh::PrefetchStar(VertexId v, int stage) const {
   if (!IsLive(v)) return;
   if (stage < 2) return PrefetchVertex(v, stage);
   const auto edges = IncidentEdges(v);
-  if (edges.size() > 2 * kManyFaces) return;
+  if (edges.size() > 2 * kLargestStar) return;
   for (EdgeId e : edges) {
     if (stage < 4) {
       PrefetchEdge(e, stage - 2);
       continue;
     }
     const auto faces = IncidentFaces(e);
-    if (faces.size() > kManyFaces) return;
+    if (faces.size() > kLargestStar) return;
     for (FaceId f : faces) {
       if (stage == 4) PrefetchFace(f);
       if (stage == 5 && IncidentCells(f).size() == 2) PrefetchCell(IncidentCells(f)[0]);

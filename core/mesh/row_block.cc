@@ -28,7 +28,7 @@ VertexFaces MakeVertexFaces() {
   }
   return faces;
 }
-const VertexFaces kVertexFaces = MakeVertexFaces();
+const VertexFaces kFacesAtVertex = MakeVertexFaces();
 
 }  // namespace
 
@@ -219,7 +219,7 @@ class RowKernels {
     const OrientedFace* faces = &mesh_.cell_faces_[size_t{c.slot()} * mesh_.cell_face_stride_];
     int local = 0;
     while (vertices[local] != v) ++local;
-    for (unsigned bits = kVertexFaces[static_cast<int>(type)][local]; bits != 0; bits &= bits - 1) {
+    for (unsigned bits = kFacesAtVertex[static_cast<int>(type)][local]; bits != 0; bits &= bits - 1) {
       if (faces[std::countr_zero(bits)].face() < corner.face) return false;
     }
     return true;

@@ -12,7 +12,7 @@
 namespace dynmesh {
 namespace {
 
-constexpr char kRpc[] = "AdaptSession";
+constexpr char kAdaptRpc[] = "AdaptSession";
 
 }  // namespace
 
@@ -112,7 +112,7 @@ void AdaptReactor::FinishNow(const absl::Status& status) {
   if (status.ok()) {
     StartWriteAndFinish(&result_, grpc::WriteOptions(), grpc::Status::OK);
   } else {
-    Finish(LoggedStatus(kRpc, status));
+    Finish(LoggedStatus(kAdaptRpc, status));
   }
 }
 

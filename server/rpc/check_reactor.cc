@@ -13,7 +13,7 @@
 namespace dynmesh {
 namespace {
 
-constexpr char kRpc[] = "CheckSession";
+constexpr char kCheckRpc[] = "CheckSession";
 
 }  // namespace
 
@@ -23,7 +23,7 @@ CheckReactor::CheckReactor(const ServiceContext& services, grpc::CallbackServerC
 
 CheckReactor* CheckReactor::Start() {
   const absl::Status posted = Post();
-  if (!posted.ok()) Finish(LoggedStatus(kRpc, posted));
+  if (!posted.ok()) Finish(LoggedStatus(kCheckRpc, posted));
   return this;
 }
 
@@ -95,7 +95,7 @@ void CheckReactor::OnWriteDone(bool ok) {
 void CheckReactor::WriteNext() {
   const bool is_last = next_ == pieces_.size();
   if (status_.ok()) status_ = CatchExceptions([this] { return FillNext(); });
-  if (!status_.ok()) return Finish(LoggedStatus(kRpc, status_));
+  if (!status_.ok()) return Finish(LoggedStatus(kCheckRpc, status_));
   is_last ? StartWriteAndFinish(&response_, grpc::WriteOptions(), grpc::Status::OK) : StartWrite(&response_);
 }
 

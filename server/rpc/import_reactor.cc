@@ -16,7 +16,7 @@
 namespace dynmesh {
 namespace {
 
-constexpr char kRpc[] = "ImportMesh";
+constexpr char kImportRpc[] = "ImportMesh";
 constexpr char kReceiving[] = "receiving";
 constexpr char kBuilding[] = "building";
 constexpr uint64_t kItemsPerReport = 100'000;
@@ -226,7 +226,7 @@ void ImportReactor::EndWith(const absl::Status& status) {
   if (status.ok()) {
     StartWriteAndFinish(&result_, grpc::WriteOptions(), grpc::Status::OK);
   } else {
-    Finish(LoggedStatus(kRpc, status));
+    Finish(LoggedStatus(kImportRpc, status));
   }
 }
 

@@ -11,7 +11,7 @@
 namespace dynmesh {
 namespace {
 
-constexpr char kRpc[] = "RepairSession";
+constexpr char kRepairRpc[] = "RepairSession";
 
 /// What the findings of a step may take in an answer.
 constexpr uint64_t kMaxStepBytes =
@@ -85,7 +85,7 @@ void RepairReactor::WriteEnd(const absl::Status& status) {
   if (status.ok()) {
     StartWriteAndFinish(&result_, grpc::WriteOptions(), grpc::Status::OK);
   } else {
-    Finish(LoggedStatus(kRpc, status));
+    Finish(LoggedStatus(kRepairRpc, status));
   }
 }
 

@@ -9,7 +9,7 @@
 namespace dynmesh {
 namespace {
 
-constexpr char kRpc[] = "Subscribe";
+constexpr char kSubscribeRpc[] = "Subscribe";
 
 void DropPayload(void* payload) { delete static_cast<PayloadPtr*>(payload); }
 
@@ -23,7 +23,7 @@ grpc::Slice SharedSlice(PayloadPtr payload) {
 }  // namespace
 
 SubscribeReactor* SubscribeReactor::Refuse(const absl::Status& status) {
-  Finish(LoggedStatus(kRpc, status));
+  Finish(LoggedStatus(kSubscribeRpc, status));
   return this;
 }
 
@@ -49,6 +49,6 @@ void SubscribeReactor::Send(PayloadPtr payload) {
   StartWrite(&buffer_);
 }
 
-void SubscribeReactor::End(const absl::Status& status) { Finish(LoggedStatus(kRpc, status)); }
+void SubscribeReactor::End(const absl::Status& status) { Finish(LoggedStatus(kSubscribeRpc, status)); }
 
 }  // namespace dynmesh
