@@ -93,8 +93,8 @@ class BatchApplier {
   absl::Status operator()(const SetAttributeEdit& edit) {
     if (!IsEntityKind(edit.spec.kind)) return BadKind(edit.spec.kind);
     const int column = mesh_.FindAttribute(edit.spec.name, edit.spec.kind);
-    const bool fits = column >= 0 && mesh_.attributes()[column].spec().components == edit.spec.components;
-    if (!fits || ScalarBytes(edit.spec.type) == 0) return UnknownAttribute(edit.spec);
+    if (column < 0) return UnknownAttribute(edit.spec);
+    DYNMESH_RETURN_IF_ERROR(CheckRowsFit(mesh_.attributes()[column].spec(), edit.spec));
     const size_t bytes = edit.slots.size() * edit.spec.row_bytes();
     if (edit.rows.size() != bytes) return BadLength("bytes of attribute rows", bytes, edit.rows.size());
     const AttributeSpec spec = mesh_.attributes()[column].spec();
@@ -103,7 +103,13 @@ class BatchApplier {
     return SetRows(column, edit.slots, rows);
   }
 
-  /// Operators have a runner of their own.
+  absl::Status operator()(const SmoothVerticesEdit& edit) {
+    DYNMESH_RETURN_IF_ERROR(operators_.Run(edit));
+    ListOnce(result_.results.back());
+    return absl::OkStatus();
+  }
+
+  /// Other operators, too, have a runner of their own.
   template <typename OperatorEdit>
   absl::Status operator()(const OperatorEdit& edit) {
     return operators_.Run(edit);
@@ -171,9 +177,34 @@ class BatchApplier {
 
   static absl::Status UnknownAttribute(const AttributeSpec& spec) {
     return MakeError(absl::StatusCode::kNotFound, reason::kUnknownAttribute,
-                     absl::StrCat("no ", EntityKindName(spec.kind), " attribute '", spec.name, "' of ",
-                                  spec.components, " components"),
+                     absl::StrCat("no ", EntityKindName(spec.kind), " attribute '", spec.name, "'"),
                      {{"attribute", spec.name}});
+  }
+
+  static absl::Status CheckRowsFit(const AttributeSpec& column, const AttributeSpec& rows) {
+    if (ScalarBytes(rows.type) == 0) {
+      return InvalidArgument(reason::kBadArgument, "the values have no type that columns have",
+                             {{"field", "type"}, {"attribute", rows.name}});
+    }
+    if (rows.components == column.components) return absl::OkStatus();
+    return InvalidArgument(reason::kBadArgument,
+                           absl::StrCat(EntityKindName(rows.kind), " attribute '", rows.name, "' has ",
+                                        column.components, " components, not ", rows.components),
+                           {{"field", "components"},
+                            {"attribute", rows.name},
+                            {"expected", absl::StrCat(column.components)},
+                            {"actual", absl::StrCat(rows.components)}});
+  }
+
+  /// Each iteration names the items that it passes over.
+  static void ListOnce(EditResult& result) {
+    std::sort(result.skipped.begin(), result.skipped.end());
+    result.skipped.erase(std::unique(result.skipped.begin(), result.skipped.end()), result.skipped.end());
+    const auto by_index = [](const Refusal& a, const Refusal& b) { return a.index < b.index; };
+    const auto same_item = [](const Refusal& a, const Refusal& b) { return a.index == b.index; };
+    std::stable_sort(result.refusals.begin(), result.refusals.end(), by_index);
+    const auto end = std::unique(result.refusals.begin(), result.refusals.end(), same_item);
+    result.refusals.erase(end, result.refusals.end());
   }
 
   void AddNewSlot(Slot slot) { result_.results.back().new_slots.push_back(slot); }

@@ -146,7 +146,7 @@ absl::StatusOr<Edit> ToEdit(const v1::SmoothVertices& message) {
   SmoothVerticesEdit edit;
   DYNMESH_ASSIGN_OR_RETURN(edit.vertices, ToArray<Slot>(message.ids(), "ids"));
   DYNMESH_ASSIGN_OR_RETURN(edit.rule.method, ToSmoothMethod(message.method()));
-  if (message.factor() != 0) edit.rule.factor = message.factor();
+  if (message.has_factor()) edit.rule.factor = message.factor();
   edit.rule.move_boundary = message.move_boundary();
   edit.rule.tangential = message.tangential();
   if (message.iterations() != 0) edit.iterations = message.iterations();

@@ -225,3 +225,34 @@ def test_handles_of_new_vertices_are_no_ids_of_queries(session):
             ask([0, handles[1]])
         assert caught.value.reason == "FOREIGN_HANDLE" and caught.value.metadata["index"] == "1"
     assert (session.positions(tx.result.resolve(handles)) == TET).all()
+
+
+@pytest.mark.parametrize("vertices", [[0.5], ["a"], [-1], 2**32 - 1, [[0, 2**31 + 4]], "all", None])
+def test_what_is_no_vertex_of_a_batch_is_not_resolved(session, vertices):
+    with session.edit() as tx:
+        handles = tx.add_vertices(TET)
+    with pytest.raises(dynmesh.InvalidArgumentError, match="vertices"):
+        tx.result.resolve(vertices)
+    assert tx.result.resolve(handles[1]) == tx.result.new_vertices[1]
+    assert tx.result.resolve([]).shape == (0,)
+
+
+def test_a_smoothing_factor_of_zero_is_refused(session):
+    session.import_mesh(TET, {"tetra": [[0, 1, 2, 3]]})
+    with pytest.raises(dynmesh.InvalidArgumentError) as caught:
+        with session.edit() as tx:
+            tx.smooth_vertices([0], factor=0, move_boundary=True)
+    assert caught.value.metadata["field"] == "factor" and session.revision == 1
+
+
+def test_rows_of_other_components_are_told_from_an_unknown_column(session):
+    session.import_mesh(TET, {"tetra": [[0, 1, 2, 3]]})
+    with session.edit() as tx:
+        tx.add_attribute("flow", "cell", components=3)
+    with pytest.raises(dynmesh.InvalidArgumentError) as caught:
+        with session.edit() as tx:
+            tx.set_attribute("flow", "cell", [0], [1.0])
+    assert caught.value.metadata["field"] == "components" and "3" in caught.value.message
+    with pytest.raises(dynmesh.NotFoundError, match="UNKNOWN_ATTRIBUTE"):
+        with session.edit() as tx:
+            tx.set_attribute("flow", "face", [0], [[1.0, 2.0, 3.0]])

@@ -195,6 +195,18 @@ std::vector<RefusalCase> RefusalCases() {
       {"attribute unknown",
        [=](R* r) { *r->add_edits()->mutable_set_attribute()->mutable_spec() = attribute("u"); },
        grpc::NOT_FOUND, reason::kUnknownAttribute, "attribute", "u"},
+      {"rows of other components",
+       [](R* r) {
+         *r->add_edits()->mutable_set_attribute()->mutable_spec() =
+             Spec("t", v1::ENTITY_KIND_VERTEX, v1::ATTRIBUTE_TYPE_FLOAT64, 3);
+       },
+       grpc::INVALID_ARGUMENT, reason::kBadArgument, "field", "components"},
+      {"smoothing by nothing",
+       [](R* r) {
+         r->add_edits()->mutable_smooth_vertices()->set_ids(Bytes<Slot>({0}));
+         r->mutable_edits(r->edits_size() - 1)->mutable_smooth_vertices()->set_factor(0);
+       },
+       grpc::INVALID_ARGUMENT, reason::kBadArgument, "field", "factor"},
       {"future", [](R* r) { r->set_as_of_revision(1000); }, grpc::OUT_OF_RANGE, reason::kRevisionInFuture,
        "actual", "3"},
       {"negative revision", [](R* r) { r->set_as_of_revision(-1); }, grpc::INVALID_ARGUMENT,

@@ -294,7 +294,7 @@ TEST(PolicyTest, RowsAreSetInTheColumnsTypeWhateverTypeTheyComeIn) {
   EXPECT_THAT(ValuesAt<float>(mesh, 0, 2), ElementsAre(0.1f));
   const std::string before = Describe(mesh);
   EXPECT_EQ(ErrorReason(set(AttributeType::kFloat64, RowOf<double>({0.1}))), reason::kInexactValue);
-  EXPECT_EQ(ErrorReason(set(AttributeType::kUnspecified, {})), reason::kUnknownAttribute);
+  EXPECT_EQ(ErrorReason(set(AttributeType::kUnspecified, {})), reason::kBadArgument);
   EXPECT_EQ(ErrorReason(set(AttributeType::kUint8, {1, 2})), reason::kBadArrayLength);
   EXPECT_EQ(Describe(mesh), before);
 }

@@ -207,6 +207,20 @@ TEST_F(ConflictTest, ManyItemsThatAreGoneAreExplainedInLinearTime) {
   EXPECT_EQ(ErrorReason(applied->results[1].refusals[0].status), reason::kConflict);
 }
 
+TEST_F(ConflictTest, VerticesThatAreSmoothedManyTimesArePassedOverOnce) {
+  mesh_ = TetGrid(3, 3, 3);
+  Theirs({MoveVerticesEdit{{21, 22}, {{1.1, 1.2, 1.1}, {2.2, 1.1, 0.9}}}});
+  SmoothVerticesEdit smooth{{22, 26, 21}, {.method = SmoothMethod::kLaplacian}, 5};
+  const auto applied =
+      ApplyBatch(mesh_, {smooth},
+                 {.as_of_revision = 1, .conflict_policy = ConflictPolicy::kTouched, .skip_refused = true});
+  ASSERT_TRUE(applied.ok()) << applied.status();
+  EXPECT_THAT(applied->results[0].skipped, ElementsAre(0, 2));
+  ASSERT_EQ(applied->results[0].refusals.size(), 2u);
+  EXPECT_EQ(applied->results[0].refusals[1].index, 2u);
+  EXPECT_EQ(ErrorReason(applied->results[0].refusals[1].status), reason::kConflict);
+}
+
 TEST_F(ConflictTest, WhatABatchDoesTwiceIsNone) {
   Theirs({MoveVerticesEdit{{CornerOf(kFirst, 0)}, {{0, 0.1, 0}}}});
   ExpectAccepted({SetAttributeEdit{kMaterial, {kLast}, kOne}, SetAttributeEdit{kMaterial, {kLast}, kZero},

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .arrays import Ids, from_bytes
+from .arguments import bad_argument
+from .arrays import Ids, as_array, as_ids, from_bytes
 from .checksum import Checksum
 from .handles import NEW_VERTEX, to_wire
 from .info import Counts, MeshWarning, checksum_from_proto, counts_from_proto
@@ -104,11 +105,15 @@ class EditResult:
         Raises
         ------
         InvalidArgumentError
-            FOREIGN_HANDLE: a handle of another batch.
+            FOREIGN_HANDLE: a handle of another batch. BAD_ARGUMENT: what is neither an id nor a handle.
         """
-        ids = np.array(to_wire(vertices, self.batch_number), dtype=np.uint32)
+        wire = as_array(to_wire(vertices, self.batch_number), "vertices")
+        ids = as_ids(wire.ravel(), "vertices").reshape(wire.shape).copy()
         handles = (ids & NEW_VERTEX) != 0
-        ids[handles] = self.new_vertices[ids[handles] & ~np.uint32(NEW_VERTEX)]
+        places = ids[handles] & ~np.uint32(NEW_VERTEX)
+        if places.size and places.max() >= len(self.new_vertices):
+            raise bad_argument("vertices", f"vertices: the batch has added {len(self.new_vertices)}, and not all of these")
+        ids[handles] = self.new_vertices[places]
         return ids
 
 
