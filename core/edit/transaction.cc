@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <string>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "core/edit/bad_argument.h"
@@ -231,25 +232,29 @@ absl::Status ApplyAll(Mesh& mesh, absl::Span<const Edit> edits, const BatchOptio
   return absl::OkStatus();
 }
 
-/// Counts what a checker looks at.
+/// Counts what a checker looks at, and asks BatchOptions::meter now and then.
 class CheckMeter final : public WorkMeter {
  public:
-  explicit CheckMeter(uint64_t max_work) : max_work_(max_work) {}
+  explicit CheckMeter(const BatchOptions& options) : options_(options) {}
 
   absl::Status ChargeSteps(uint64_t steps) override {
     work_ += steps;
-    return work_ <= max_work_ ? absl::OkStatus() : LimitExceeded("max_batch_work", max_work_, work_);
+    uncharged_ += steps;
+    if (work_ > options_.max_work) return LimitExceeded("max_batch_work", options_.max_work, work_);
+    return uncharged_ < kMaxCharge ? absl::OkStatus()
+                                   : options_.meter.ChargeManySteps(std::exchange(uncharged_, 0));
   }
   absl::Status ChargeBytes(uint64_t) override { return absl::OkStatus(); }
 
  private:
-  const uint64_t max_work_;
+  const BatchOptions& options_;
   uint64_t work_ = 0;
+  uint64_t uncharged_ = 0;
 };
 
 absl::Status CheckAll(const Mesh& mesh, const BatchOptions& options, BatchResult& result) {
   if (options.checker == nullptr) return absl::OkStatus();
-  CheckMeter meter(options.max_work);
+  CheckMeter meter(options);
   return options.checker->Check(mesh, meter, result.warnings);
 }
 

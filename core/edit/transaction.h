@@ -14,6 +14,7 @@
 #include "core/edit/edits.h"
 #include "core/mesh/batch_image.h"
 #include "core/mesh/mesh.h"
+#include "core/mesh/work_meter.h"
 
 namespace dynmesh {
 
@@ -87,6 +88,8 @@ struct BatchOptions {
   /// Looks at the mesh after the last edit, and may refuse the batch or add warnings. It may look at max_work
   /// entities, too. Null: nobody looks.
   BatchChecker* checker = nullptr;
+  /// Whom the checker asks before it goes on, so that it ends when nobody wants the batch any more.
+  WorkMeter& meter = WorkMeter::Unlimited();
   /// Tell what undoes the batch (RestoreBatches).
   bool make_image = false;
 };

@@ -9,12 +9,13 @@
 
 namespace dynmesh {
 
-absl::Status ApplyEdits(Session& session, const v1::ApplyEditsRequest& request,
+absl::Status ApplyEdits(Session& session, const v1::ApplyEditsRequest& request, const StopSignal& stop,
                         v1::ApplyEditsResponse* response) {
   DYNMESH_RETURN_IF_ERROR(CheckMessageSize(request, session.limits()));
   DYNMESH_ASSIGN_OR_RETURN(const std::vector<Edit> edits, ToEdits(request, session.limits()));
   DYNMESH_ASSIGN_OR_RETURN(const ApplyOptions options, ToApplyOptions(request));
-  DYNMESH_ASSIGN_OR_RETURN(const std::shared_ptr<const BatchResult> result, session.Apply(edits, options));
+  DYNMESH_ASSIGN_OR_RETURN(const std::shared_ptr<const BatchResult> result,
+                           session.Apply(edits, options, stop));
   FromBatchResult(*result, response);
   return absl::OkStatus();
 }

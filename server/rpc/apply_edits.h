@@ -11,7 +11,7 @@ namespace dynmesh {
 
 /// One batch: what ApplyEdits answers, and StreamEdits in band. REQUIRES: it is the caller's turn at
 /// `session`.
-absl::Status ApplyEdits(Session& session, const v1::ApplyEditsRequest& request,
+absl::Status ApplyEdits(Session& session, const v1::ApplyEditsRequest& request, const StopSignal& stop,
                         v1::ApplyEditsResponse* response);
 
 /// About the memory that `request` holds: tiny edits are small on the wire, but not here.

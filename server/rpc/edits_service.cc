@@ -5,6 +5,7 @@
 #include "server/rpc/apply_edits.h"
 #include "server/rpc/call_stop.h"
 #include "server/rpc/convert_edits.h"
+#include "server/rpc/query_weight.h"
 #include "server/rpc/stream_edits_reactor.h"
 #include "server/rpc/unary.h"
 
@@ -15,8 +16,8 @@ namespace {
 template <typename Request, typename Response>
 grpc::ServerUnaryReactor* MoveInHistory(const UnaryCall& call, HistoryMove move, const Request& request,
                                         Response* response) {
-  // One batch is undone in about the time that it took; many may take longer.
-  const bool heavy = request.count() > 1;
+  const absl::StatusOr<SessionPtr> found = call.services.registry.Find(request.session());
+  const bool heavy = found.ok() && IsHeavyMove(request.count(), (*found)->num_history_items(move));
   return RunOnSession(call, request.session(), {AccessMode::kWrite, heavy, request.ByteSizeLong()},
                       [context = call.context, move, &request, response](const SessionPtr& session,
                                                                          AccessGrant) -> absl::Status {
@@ -37,8 +38,8 @@ class EditsService final : public v1::EditService::CallbackService {
                                        v1::ApplyEditsResponse* response) override {
     return RunOnSession({"ApplyEdits", context, services_}, request->session(),
                         {AccessMode::kWrite, /*heavy=*/false, MemoryOf(*request)},
-                        [request, response](const SessionPtr& session, AccessGrant) {
-                          return dynmesh::ApplyEdits(*session, *request, response);
+                        [context, request, response](const SessionPtr& session, AccessGrant) {
+                          return dynmesh::ApplyEdits(*session, *request, CallStop(context), response);
                         });
   }
 
@@ -55,8 +56,8 @@ class EditsService final : public v1::EditService::CallbackService {
   }
 
   grpc::ServerBidiReactor<v1::StreamEditsRequest, v1::StreamEditsResponse>* StreamEdits(
-      grpc::CallbackServerContext*) override {
-    return (new StreamEditsReactor(services_))->Start();
+      grpc::CallbackServerContext* context) override {
+    return (new StreamEditsReactor(services_, context))->Start();
   }
 
  private:

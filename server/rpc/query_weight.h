@@ -5,8 +5,8 @@
 
 #include "server/rpc/session_work.h"
 
-/// Which queries are heavy (SessionWork), judged before they run by what a mesh of so many entities may make
-/// of them at worst: piled up in one place, or all adjacent to one another.
+/// Which queries and moves in history are heavy (SessionWork), judged before they run: queries by what a mesh
+/// of so many entities may make of them at worst, piled up in one place, or all adjacent to one another.
 namespace dynmesh {
 
 /// Entities that a light query may come by at worst: up to a microsecond each.
@@ -28,6 +28,15 @@ constexpr bool IsHeavyPlaceQuery(uint64_t num_places, uint64_t num_live) {
 /// Of asking for the rings of `num_selected` entities: already the second may be the whole mesh.
 constexpr bool IsHeavyRingQuery(uint64_t num_selected, uint32_t rings, uint64_t num_live) {
   return rings > 1 && MayVisitMany(num_selected, num_live);
+}
+
+/// Entities and rows that a light call may put back: a third of a microsecond each, more where they are
+/// scattered.
+inline constexpr uint64_t kManyRestored = 100'000;
+
+/// Of undoing or redoing `count` batches, the first of which names `num_items`.
+constexpr bool IsHeavyMove(uint32_t count, uint64_t num_items) {
+  return count > 1 || num_items > kManyRestored;
 }
 
 }  // namespace dynmesh

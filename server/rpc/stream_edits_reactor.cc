@@ -178,7 +178,7 @@ void StreamEditsReactor::ApplyOne(const SessionPtr& session, const Request& requ
   if (!request.refused.ok()) return Refuse(request.refused, session->revision());
   v1::StreamEditsResponse response;
   const absl::Status status =
-      CatchExceptions([&] { return ApplyEdits(*session, request.batch, response.mutable_applied()); });
+      CatchExceptions([&] { return ApplyEdits(*session, request.batch, stop_, response.mutable_applied()); });
   status.ok() ? Answer(std::move(response)) : Refuse(status, session->revision());
 }
 

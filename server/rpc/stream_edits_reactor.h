@@ -7,6 +7,7 @@
 #include "absl/status/status.h"
 #include "dynmesh/v1/edits.pb.h"
 #include "grpcpp/support/server_callback.h"
+#include "server/rpc/call_stop.h"
 #include "server/rpc/open_streams.h"
 #include "server/rpc/service_context.h"
 #include "server/session/budget.h"
@@ -28,7 +29,8 @@ class StreamEditsReactor final
     : public grpc::ServerBidiReactor<v1::StreamEditsRequest, v1::StreamEditsResponse>,
       public Drainable {
  public:
-  explicit StreamEditsReactor(const ServiceContext& services) : services_(services) {}
+  StreamEditsReactor(const ServiceContext& services, const grpc::CallbackServerContext* context)
+      : services_(services), stop_(context) {}
 
   StreamEditsReactor* Start();
 
@@ -70,6 +72,7 @@ class StreamEditsReactor final
   void StopApplying() ABSL_LOCKS_EXCLUDED(mu_);
 
   const ServiceContext services_;
+  const CallStop stop_;
   v1::StreamEditsRequest reading_into_;
   v1::StreamEditsResponse writing_from_;
 

@@ -22,11 +22,18 @@ ReportOptions OptionsOf(const Session& session, const CheckQuestion& question) {
           question.max_findings};
 }
 
-/// Whoever works on a copy keeps nobody waiting: only what its answer holds, and a caller who is gone, end
-/// it.
-Limits Unhurried(Limits limits) {
-  limits.max_query_steps = limits.max_query_bytes = std::numeric_limits<int64_t>::max();
-  return limits;
+/// What the whole of a mesh may take: some ten times what all checks take of hexahedra, whose entities take
+/// most; more only where many elements are equal.
+constexpr uint64_t kMaxStepsForEntity = 2'000;
+constexpr uint64_t kMaxStepsForAny = 10'000'000;
+
+/// Whoever works on a copy keeps nobody waiting: what its answer holds, a caller who is gone, and work beyond
+/// all measure end it.
+QueryBudget::Bounds BoundsFor(const Mesh& mesh) {
+  uint64_t entities = 0;
+  for (EntityKind kind : kEntityKinds) entities += mesh.NumLive(kind);
+  return {std::numeric_limits<int64_t>::max(), kMaxStepsForAny + kMaxStepsForEntity * entities,
+          "max_check_work"};
 }
 
 }  // namespace
@@ -40,7 +47,7 @@ absl::StatusOr<CheckReport> CheckWholeSession(const Session& session, const Chec
     return absl::OkStatus();
   }));
   copied(copy->revision());
-  QueryBudget budget(Unhurried(session.limits()), terms);
+  QueryBudget budget(BoundsFor(*copy), terms);
   return CheckMesh(*copy, OptionsOf(session, question), budget, monitor);
 }
 

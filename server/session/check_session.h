@@ -31,8 +31,8 @@ struct CheckQuestion {
 };
 
 /// Checks all of a copy of the session, so that nobody waits but while it is made: `copied` is called then.
-/// Errors: whatever `terms.stop` says; RESOURCE_EXHAUSTED LIMIT_EXCEEDED (max_answer_bytes); those of
-/// Session::Read. REQUIRES: no `part`.
+/// Errors: whatever `terms.stop` says; RESOURCE_EXHAUSTED LIMIT_EXCEEDED (max_answer_bytes, max_check_work);
+/// those of Session::Read. REQUIRES: no `part`.
 absl::StatusOr<CheckReport> CheckWholeSession(const Session& session, const CheckQuestion& question,
                                               const QueryTerms& terms, ReportMonitor& monitor,
                                               absl::FunctionRef<void(int64_t revision)> copied);

@@ -32,6 +32,10 @@ class History {
   uint64_t max_bytes() const { return max_bytes_; }
   /// How many batches can be undone, or redone.
   uint32_t size(HistoryMove move) const { return static_cast<uint32_t>(stack(move).size()); }
+  /// Of the batch that is moved next: BatchImage::num_items(). 0 without one.
+  uint64_t num_next_items(HistoryMove move) const {
+    return stack(move).empty() ? 0 : stack(move).back().num_items();
+  }
   uint64_t memory_bytes() const { return bytes_; }
 
   /// A batch has made `revision`; `image` undoes it.

@@ -27,8 +27,15 @@ class QueryBudget final : public WorkMeter {
  public:
   static constexpr uint64_t kStepsPerCheck = WorkMeter::kMaxCharge;
 
+  struct Bounds {
+    uint64_t max_bytes;
+    uint64_t max_steps;
+    const char* steps_name;  ///< of that limit
+  };
+
   QueryBudget(const Limits& limits, const QueryTerms& terms)
-      : max_bytes_(limits.max_query_bytes), max_steps_(limits.max_query_steps), terms_(terms) {}
+      : QueryBudget(Bounds{limits.max_query_bytes, limits.max_query_steps, "max_query_steps"}, terms) {}
+  QueryBudget(const Bounds& bounds, const QueryTerms& terms) : bounds_(bounds), terms_(terms) {}
 
   /// Errors: RESOURCE_EXHAUSTED LIMIT_EXCEEDED (max_query_bytes, max_answer_bytes).
   absl::Status ChargeBytes(uint64_t bytes) override {
@@ -41,7 +48,7 @@ class QueryBudget final : public WorkMeter {
   absl::Status CheckBytes(uint64_t bytes) const;
 
   /// To be called before the steps are made, so `steps` should be no more than some kStepsPerCheck.
-  /// Errors: RESOURCE_EXHAUSTED LIMIT_EXCEEDED (max_query_steps); those of the StopSignal.
+  /// Errors: RESOURCE_EXHAUSTED LIMIT_EXCEEDED (Bounds::steps_name); those of the StopSignal.
   absl::Status ChargeSteps(uint64_t steps) override {
     steps_ += steps;
     return steps_ < next_check_ ? absl::OkStatus() : CheckSteps();
@@ -54,8 +61,7 @@ class QueryBudget final : public WorkMeter {
   absl::Status LeaseMore();
   absl::Status CheckSteps();
 
-  const uint64_t max_bytes_;
-  const uint64_t max_steps_;
+  const Bounds bounds_;
   const QueryTerms terms_;
   uint64_t bytes_ = 0;
   uint64_t leased_ = 0;

@@ -14,6 +14,7 @@
 #include "core/mesh/error.h"
 #include "server/session/catch_exceptions.h"
 #include "server/session/fingerprint.h"
+#include "server/session/mesh_meter.h"
 #include "server/session/session_errors.h"
 #include "spdlog/spdlog.h"
 
@@ -160,7 +161,8 @@ SessionInfo Session::Describe(const Mesh& mesh, const MeshSummary& summary, absl
   return info;
 }
 
-absl::StatusOr<Session::AnswerPtr> Session::Apply(absl::Span<const Edit> edits, const ApplyOptions& options) {
+absl::StatusOr<Session::AnswerPtr> Session::Apply(absl::Span<const Edit> edits, const ApplyOptions& options,
+                                                  const StopSignal& stop) {
   DYNMESH_RETURN_IF_ERROR(CheckRequestId(options.request_id));
   DYNMESH_RETURN_IF_ERROR(CheckBatchSize(edits, limits()));
   const bool once = !options.request_id.empty() && !options.validate_only;
@@ -170,27 +172,29 @@ absl::StatusOr<Session::AnswerPtr> Session::Apply(absl::Span<const Edit> edits, 
   {
     WriterMutexLock lock(&mu_);
     DYNMESH_RETURN_IF_ERROR(gone_);
-    answer = once ? ApplyOnce(edits, options, fingerprint) : ApplyLocked(edits, options);
+    answer = once ? ApplyOnce(edits, options, fingerprint, stop) : ApplyLocked(edits, options, stop);
   }
   if (revision() != revision_before) followers_.Wake();
   return answer;
 }
 
 absl::StatusOr<Session::AnswerPtr> Session::ApplyOnce(absl::Span<const Edit> edits,
-                                                      const ApplyOptions& options, uint64_t fingerprint) {
+                                                      const ApplyOptions& options, uint64_t fingerprint,
+                                                      const StopSignal& stop) {
   DYNMESH_ASSIGN_OR_RETURN(AnswerPtr remembered, answers_.Find(options.request_id, fingerprint));
   if (remembered != nullptr) return remembered;
-  DYNMESH_ASSIGN_OR_RETURN(AnswerPtr answer, ApplyLocked(edits, options));
+  DYNMESH_ASSIGN_OR_RETURN(AnswerPtr answer, ApplyLocked(edits, options, stop));
   answers_.Remember(options.request_id, fingerprint, answer, BytesOf(*answer));
   return answer;
 }
 
 absl::StatusOr<Session::AnswerPtr> Session::ApplyLocked(absl::Span<const Edit> edits,
-                                                        const ApplyOptions& options) {
+                                                        const ApplyOptions& options, const StopSignal& stop) {
   DYNMESH_RETURN_IF_ERROR(CheckRevisions(options));
   if (edits.empty()) return Unchanged();
   DYNMESH_ASSIGN_OR_RETURN(const bool is_large, CheckMemory(edits));
-  BatchOptions batch;
+  MeshMeter meter({.used_bytes = 0, .max_bytes = limits().max_session_bytes}, stop);
+  BatchOptions batch{.meter = meter};
   if (options.as_of_revision != 0) batch.as_of_revision = options.as_of_revision;
   batch.dry_run = options.validate_only;
   batch.skip_refused = options.skip_refused;
@@ -315,6 +319,9 @@ void Session::MakeRoom(uint64_t mesh_bytes) {
 void Session::CountHistory() {
   num_undoable_.store(history_.size(HistoryMove::kUndo));
   num_redoable_.store(history_.size(HistoryMove::kRedo));
+  for (HistoryMove move : {HistoryMove::kUndo, HistoryMove::kRedo}) {
+    num_history_items_[static_cast<int>(move)].store(history_.num_next_items(move));
+  }
   history_bytes_.store(history_.memory_bytes());
 }
 

@@ -145,14 +145,16 @@ class Session : public std::enable_shared_from_this<Session> {
   /// Applies a batch as one revision, all or nothing. Without edits it answers with the current state.
   /// Makes the checks() of the session on what the batch touches, which may refuse it (NeighborhoodCheck).
   /// Errors: those of ApplyBatch; ABORTED REVISION_MISMATCH (metadata expected, actual); OUT_OF_RANGE
-  /// REVISION_IN_FUTURE; INVALID_ARGUMENT REQUEST_ID_REUSED; RESOURCE_EXHAUSTED. Nothing changed then.
+  /// REVISION_IN_FUTURE; INVALID_ARGUMENT REQUEST_ID_REUSED; RESOURCE_EXHAUSTED; those of `stop`, which the
+  /// checks ask. Nothing changed then.
   absl::StatusOr<std::shared_ptr<const BatchResult>> Apply(absl::Span<const Edit> edits,
-                                                           const ApplyOptions& options)
+                                                           const ApplyOptions& options,
+                                                           const StopSignal& stop = StopSignal::Never())
       ABSL_LOCKS_EXCLUDED(mu_);
 
-  /// Edits the mesh in whatever way, as one revision: calls edit(mesh) in an open batch, which then ends as that
-  /// says, and then ended(mesh), both under the writer lock. For what is no list of edits. An edit that takes
-  /// long must see itself that it stays within memory and that somebody waits for it (MeshMeter).
+  /// Edits the mesh in whatever way, as one revision: calls edit(mesh) in an open batch, which then ends as
+  /// that says, and then ended(mesh), both under the writer lock. For what is no list of edits. An edit that
+  /// takes long must see itself that it stays within memory and that somebody waits for it (MeshMeter).
   /// Errors: those of edit; RESOURCE_EXHAUSTED. Nothing changed then, and ended is not called.
   absl::Status EditMesh(absl::FunctionRef<absl::StatusOr<BatchEnding>(Mesh&)> edit,
                         absl::FunctionRef<void(const Mesh&)> ended) ABSL_LOCKS_EXCLUDED(mu_);
@@ -190,6 +192,11 @@ class Session : public std::enable_shared_from_this<Session> {
     return Update({.stored_relations = std::vector<Relation>(wanted.begin(), wanted.end())}, etag, stop);
   }
 
+  /// How much the batch names that is to be undone, or redone, next: entities and rows. Never waits.
+  uint64_t num_history_items(HistoryMove move) const {
+    return num_history_items_[static_cast<int>(move)].load();
+  }
+
   /// What is checked of each batch. Never waits.
   CheckSettings checks() const ABSL_LOCKS_EXCLUDED(settings_mu_) {
     MutexLock lock(&settings_mu_);
@@ -224,10 +231,11 @@ class Session : public std::enable_shared_from_this<Session> {
   absl::Status CheckEtag(absl::string_view etag) const ABSL_SHARED_LOCKS_REQUIRED(mu_);
   absl::Status CheckRevisions(const ApplyOptions& options) const ABSL_SHARED_LOCKS_REQUIRED(mu_);
   absl::Status CheckRevision(absl::optional<int64_t> if_revision) const ABSL_SHARED_LOCKS_REQUIRED(mu_);
-  absl::StatusOr<AnswerPtr> ApplyLocked(absl::Span<const Edit> edits, const ApplyOptions& options)
-      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
+  absl::StatusOr<AnswerPtr> ApplyLocked(absl::Span<const Edit> edits, const ApplyOptions& options,
+                                        const StopSignal& stop) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
   absl::StatusOr<AnswerPtr> ApplyOnce(absl::Span<const Edit> edits, const ApplyOptions& options,
-                                      uint64_t fingerprint) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
+                                      uint64_t fingerprint, const StopSignal& stop)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
   absl::StatusOr<BatchEnding> EditLocked(absl::FunctionRef<absl::StatusOr<BatchEnding>(Mesh&)> edit)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
   absl::StatusOr<HistoryAnswerPtr> MoveOnce(HistoryMove move, const HistoryOptions& options,
@@ -264,6 +272,7 @@ class Session : public std::enable_shared_from_this<Session> {
   std::atomic<uint64_t> num_updates_{0};  ///< of settings
   std::array<std::atomic<uint32_t>, kNumEntityKinds> num_live_ = {};
   std::atomic<uint32_t> num_undoable_{0}, num_redoable_{0};
+  std::array<std::atomic<uint64_t>, 2> num_history_items_ = {};
   std::atomic<uint64_t> history_bytes_{0};
 
   mutable Mutex settings_mu_;

@@ -40,5 +40,12 @@ TEST(QueryWeightTest, RingsAreJudgedByWhatTheyMayReach) {
   EXPECT_TRUE(IsHeavyRingQuery(kMax, 2, kMax)) << "nothing overflows";
 }
 
+TEST(QueryWeightTest, MovesInHistoryAreJudgedByWhatTheyPutBack) {
+  EXPECT_FALSE(IsHeavyMove(0, 0)) << "0 means one";
+  EXPECT_FALSE(IsHeavyMove(1, kManyRestored));
+  EXPECT_TRUE(IsHeavyMove(1, kManyRestored + 1));
+  EXPECT_TRUE(IsHeavyMove(2, 0));
+}
+
 }  // namespace
 }  // namespace dynmesh::testing

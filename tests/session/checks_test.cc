@@ -167,6 +167,41 @@ TEST(ChecksTest, NobodyGoesOnForACallerWhoIsGone) {
   }
 }
 
+TEST(ChecksTest, ABatchWhoseChecksNobodyWaitsForIsRefused) {
+  Daemon daemon;
+  const SessionPtr session =
+      daemon.NewSession("mesh", {.checks = With(CheckKind::kVertexLink, Severity::kWarn)});
+  MustApply(*session, EditsOf(TetGrid(8, 8, 8)));
+  std::vector<Edit> moves = {MoveVerticesEdit()};
+  auto& move = std::get<MoveVerticesEdit>(moves[0]);
+  for (Slot v = 0; v < session->num_live(EntityKind::kVertex); ++v) move.vertices.push_back(v);
+  move.positions.resize(move.vertices.size());
+  const Checksum before = ChecksumOf(*session);
+  StopAfter stop(2);
+  EXPECT_TRUE(absl::IsCancelled(session->Apply(moves, {}, stop).status()));
+  EXPECT_EQ(ChecksumOf(*session), before);
+  EXPECT_EQ(session->revision(), 1);
+  EXPECT_TRUE(session->Apply(moves, {}).ok());
+}
+
+TEST(ChecksTest, ThousandsOfEqualCellsAreTooMuchWork) {
+  constexpr int kMany = 6000;
+  Daemon daemon;
+  const SessionPtr session = daemon.NewSession();
+  AddElementsEdit cells{ElementType::kTetrahedron, {}};
+  for (int i = 0; i < kMany; ++i) {
+    for (Slot k : {0, 1, 2, 3}) cells.vertices.push_back(kNewVertex | k);
+  }
+  MustApply(*session, {AddVerticesEdit{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}, cells});
+  CheckQuestion question;
+  question.checks = With(CheckKind::kDuplicate, Severity::kWarn);
+  const auto refused = Check(*session, question);
+  EXPECT_EQ(RefusalOf(refused), (Refusal{absl::StatusCode::kResourceExhausted, reason::kLimitExceeded}));
+  EXPECT_EQ(MetadataOf(refused.status(), "limit"), "max_check_work");
+  question.checks = With(CheckKind::kQuality, Severity::kWarn);
+  EXPECT_TRUE(Check(*session, question).ok());
+}
+
 TEST(ChecksTest, FindingsCountAgainstWhatWaitsToBeRead) {
   Daemon daemon;
   const SessionPtr session = daemon.NewSession();

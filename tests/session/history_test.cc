@@ -57,6 +57,19 @@ TEST_F(HistoryTest, UndoAndRedoAreOneRevisionEach) {
   EXPECT_EQ(session->revision(), 8);
 }
 
+TEST_F(HistoryTest, HowMuchTheNextBatchNamesIsKnownBeforehand) {
+  const SessionPtr session = daemon_.NewSession();
+  EXPECT_EQ(session->num_history_items(kUndo), 0u);
+  MustApply(*session, AddTet());  // 4 vertices, 6 edges, 4 faces, 1 cell
+  EXPECT_EQ(session->num_history_items(kUndo), 15u);
+  MustApply(*session, {MoveVerticesEdit{{0, 1}, {{5, 5, 5}, {6, 6, 6}}}});
+  EXPECT_EQ(session->num_history_items(kUndo), 2u);
+  EXPECT_EQ(session->num_history_items(kRedo), 0u);
+  Must(*session, kUndo);
+  EXPECT_EQ(session->num_history_items(kUndo), 15u);
+  EXPECT_EQ(session->num_history_items(kRedo), 2u);
+}
+
 TEST_F(HistoryTest, NothingIsDoneWhenThereAreFewerBatches) {
   const SessionPtr session = daemon_.NewSession();
   ExpectRefused(*session, kUndo, {}, NoUndo());

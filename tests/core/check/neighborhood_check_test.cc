@@ -153,6 +153,20 @@ TEST(NeighborhoodCheckTest, CheckingAHugeStarIsRefusedByItsWork) {
   EXPECT_TRUE(Apply(mesh, move, settings, {.max_work = 100'000}).ok());
 }
 
+TEST(NeighborhoodCheckTest, CheckingEndsWhenTheMeterSaysSo) {
+  Mesh mesh = TetGrid(6, 6, 6);
+  const std::string before = Describe(mesh);
+  MoveVerticesEdit move;
+  for (Slot v = 0; v < mesh.NumLive(EntityKind::kVertex); ++v) move.vertices.push_back(v);
+  move.positions.resize(move.vertices.size());
+  const CheckSettings settings = With(CheckKind::kVertexLink, Severity::kWarn);
+  CountDown meter(10'000);
+  EXPECT_EQ(Apply(mesh, move, settings, {.meter = meter}).status(), CountDown::error());
+  EXPECT_EQ(meter.charges_after_end(), 0);
+  EXPECT_EQ(Describe(mesh), before);
+  EXPECT_TRUE(Apply(mesh, move, settings).ok());
+}
+
 TEST(NeighborhoodCheckTest, ManyFindingsAreCountedAndTheFirstOnesNamed) {
   Mesh mesh;
   AddVerticesEdit vertices;
