@@ -39,8 +39,8 @@ inline constexpr char kWouldChangeForm[] = "WOULD_CHANGE_FORM";
 
 /// Why an adaptation ended.
 enum class AdaptEnd {
-  kConverged,    ///< edges have the target length as far as the guards permit
-  kMaxPasses,    ///< there is more to do
+  kConverged,    ///< the last pass split and collapsed fewer than one edge in 500
+  kMaxPasses,    ///< the last pass still split and collapsed more
   kMaxElements,  ///< splits are missing
 };
 
