@@ -107,6 +107,13 @@ v1::ApplyEditsResponse ServerTest::MustApply(const v1::ApplyEditsRequest& reques
   return response;
 }
 
+void ServerTest::ExpectStillEmpty(const std::string& name) {
+  const v1::Session session = GetSession(name);
+  EXPECT_EQ(session.revision(), 0);
+  EXPECT_EQ(session.counts().vertices(), 0u);
+  EXPECT_EQ(session.checksum().topology(), 0u);
+}
+
 grpc::Status ServerTest::DeleteSession(const std::string& name, const std::string& etag) {
   PatientContext context;
   v1::DeleteSessionRequest request;

@@ -79,6 +79,8 @@ class ServerTest : public ::testing::Test {
   grpc::Status Apply(const v1::ApplyEditsRequest& request, v1::ApplyEditsResponse* response = nullptr);
   /// Fails the test when refused.
   v1::ApplyEditsResponse MustApply(const v1::ApplyEditsRequest& request);
+  /// Fails the test unless the session is at revision 0.
+  void ExpectStillEmpty(const std::string& name);
   grpc::Status DeleteSession(const std::string& name, const std::string& etag = "");
 
   /// Imports vertices and elements as they stand in `mesh`, by ascending dimension.
