@@ -181,17 +181,21 @@ absl::Status OperatorRunner::Run(const DissolveVerticesEdit& edit) {
 
 absl::Status OperatorRunner::Run(const SmoothVerticesEdit& edit) {
   DYNMESH_RETURN_IF_ERROR(CheckSmoothing(edit));
-  std::vector<bool> moved(edit.vertices.size());
+  std::vector<bool> moved(edit.vertices.size()), skipped(edit.vertices.size());
   for (uint32_t iteration = 0; iteration < edit.iterations; ++iteration) {
+    std::vector<bool> planned(edit.vertices.size());
     const auto plan = [&](size_t i) -> absl::Status {
+      if (skipped[i]) return absl::OkStatus();
       const absl::StatusOr<VertexId> v = names_.LiveVertex(edit.vertices[i]);
       if (!v.ok()) return iteration == 0 ? v.status() : absl::OkStatus();
-      const absl::Status planned = PlanSmoothVertex(mesh_, *v, edit.rule, edit.limits, patch_);
-      if (!planned.ok()) return iteration == 0 ? planned : absl::OkStatus();
-      if (!patch_.moves.empty()) moved[i] = true;
+      const absl::Status found = PlanSmoothVertex(mesh_, *v, edit.rule, edit.limits, patch_);
+      if (!found.ok()) return iteration == 0 ? found : absl::OkStatus();
+      planned[i] = !patch_.moves.empty();
       return absl::OkStatus();
     };
     DYNMESH_RETURN_IF_ERROR(RunAll({edit.vertices.size(), 0}, edit.limits, plan));
+    for (uint32_t i : result_.results.back().skipped) skipped[i] = true;
+    for (size_t i = 0; i < moved.size(); ++i) moved[i] = moved[i] || (planned[i] && !skipped[i]);
   }
   result_.results.back().num_moved = std::count(moved.begin(), moved.end(), true);
   return absl::OkStatus();

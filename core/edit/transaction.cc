@@ -104,13 +104,7 @@ class BatchApplier {
     return SetRows(column, edit.slots, rows);
   }
 
-  absl::Status operator()(const SmoothVerticesEdit& edit) {
-    DYNMESH_RETURN_IF_ERROR(operators_.Run(edit));
-    ListOnce(result_.results.back());
-    return absl::OkStatus();
-  }
-
-  /// Other operators, too, have a runner of their own.
+  /// Operators have a runner of their own.
   template <typename OperatorEdit>
   absl::Status operator()(const OperatorEdit& edit) {
     return operators_.Run(edit);
@@ -195,17 +189,6 @@ class BatchApplier {
                             {"attribute", rows.name},
                             {"expected", absl::StrCat(column.components)},
                             {"actual", absl::StrCat(rows.components)}});
-  }
-
-  /// Each iteration names the items that it passes over.
-  static void ListOnce(EditResult& result) {
-    std::sort(result.skipped.begin(), result.skipped.end());
-    result.skipped.erase(std::unique(result.skipped.begin(), result.skipped.end()), result.skipped.end());
-    const auto by_index = [](const Refusal& a, const Refusal& b) { return a.index < b.index; };
-    const auto same_item = [](const Refusal& a, const Refusal& b) { return a.index == b.index; };
-    std::stable_sort(result.refusals.begin(), result.refusals.end(), by_index);
-    const auto end = std::unique(result.refusals.begin(), result.refusals.end(), same_item);
-    result.refusals.erase(end, result.refusals.end());
   }
 
   void AddNewSlot(Slot slot) { result_.results.back().new_slots.push_back(slot); }
