@@ -79,6 +79,8 @@ def test_operators_change_what_is_named_and_a_dry_run_tells(run, mesh_file):
     skipped = json.loads(run("swap", "ops", *places, "--skip-refused", "--json").stdout)
     assert skipped["skipped"] == [0, 1]
     assert [refusal["reason"] for refusal in skipped["refusals"]] == ["BOUNDARY", "UNKNOWN_ENTITY"]
+    passed_over = run("split", "ops", "--ends", 0, 4000, "--skip-refused", "--dry-run", "--json")
+    assert json.loads(passed_over.stdout)["new_vertices"] == [None]
     assert "item 1: UNKNOWN_ENTITY" in run("swap", "ops", *places, "--skip-refused").stdout
     assert run("collapse", "ops", "--ends", 0, 5, "--at", "0").stdout.startswith("revision 6: 5 vertices")
     assert run("rm", "ops", "--yes").returncode == 0
@@ -109,6 +111,7 @@ def test_a_repair_tells_what_it_did_and_a_dry_run_what_it_would_do(run, tmp_path
     assert (done["revision"], done["steps"]) == (2, dry["steps"])
     assert done["counts"] == {"vertices": 4, "edges": 5, "faces": 2, "cells": 0}
     text = run("repair", "halves", "--orient", "--fill-holes", "3").stdout
+    assert run("repair", "halves", "--orient", "--dry-run").stdout == "would be done at revision 2\norient: nothing\n"
     assert text == "revision 2\norient: nothing\nfill holes: 1 hole too long\norient: nothing\n"
     refused = run("repair", "halves", "--weld", "-1")
     assert refused.returncode != 0 and "Traceback" not in refused.stderr
@@ -192,7 +195,9 @@ def test_warnings_of_the_mesh_are_on_stderr(run, tmp_path):
     meshio.write(tmp_path / "zoo.vtu", zoo())
     created = run("create", "zoo", tmp_path / "zoo.vtu", "--json", "--attributes", "")
     assert created.returncode == 0 and "DEGENERATE_ELEMENT" in created.stderr
-    assert json.loads(created.stdout)["element_counts"]["cells"] == 4
+    record = json.loads(created.stdout)
+    assert record["element_counts"]["cells"] == 4
+    assert "DEGENERATE_ELEMENT" in [warning["reason"] for warning in record["warnings"]]
     run("rm", "zoo")
 
 
@@ -386,6 +391,26 @@ def test_checks_of_batches_are_set_by_name(session, run):
     assert session.info().checks["min_dihedral"] == ("warn", 5.0)
     assert run("set-checks", session.name, "none").returncode == 0
     assert session.info().checks == {}
+
+
+def test_batches_tell_what_the_checks_warn_of(session, run):
+    session.import_mesh(two_tets())
+    assert run("set-checks", session.name, "quality=warn:0.95").returncode == 0
+    told = run("split", session.name, "--ends", 1, 2, "--json")
+    (warning,) = json.loads(told.stdout)["warnings"]
+    assert (warning["check"], warning["reason"], warning["kind"]) == ("quality", "CHECK_FAILED", "cell")
+    assert (warning["count"], warning["threshold"], len(warning["ids"])) == (4, 0.95, 4)
+    assert told.stderr.startswith("dynmesh: warning: quality") and told.stderr.count("\n") == 1
+    first = f"{warning['ids'][0]} ({warning['values'][0]:.4g}), "
+    for command in (("smooth", "--move-boundary"), ("collapse", "--ends", 1, 5, "--dry-run")):
+        name, *options = command
+        shown = run(name, session.name, *options)
+        assert shown.returncode == 0 and shown.stderr.startswith("dynmesh: warning: quality"), shown.stderr
+        assert " cell(s)): " in shown.stderr and shown.stderr.count("\n") == 1
+    assert first in told.stderr
+    session.set_checks({})
+    quiet = run("smooth", session.name, "--json")
+    assert (quiet.stderr, json.loads(quiet.stdout)["warnings"]) == ("", [])
 
 
 def test_merge_welds_pairs_of_vertices(session, run):

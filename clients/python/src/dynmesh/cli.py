@@ -17,9 +17,11 @@ import numpy as np
 
 from .cli_adapt import adapt, add_adapt
 from .cli_check import CHECK_FAILED, CHECK_FOUND, add_check, add_settings, describe_report, run_check
-from .cli_edit import add_operators, operate
+from .cli_edit import add_operators, describe_operators, operate, operator_record
+from .cli_parser import CommandParser, UsageError, positive
 from .cli_query import add_questions
 from .cli_repair import add_repair_options, describe_repair, repair, repair_record
+from .cli_warnings import print_warnings, warning_records
 from .cli_watch import watch
 from .client import DEFAULT_TARGET, DEFAULT_TIMEOUT_S, Client, connect
 from .daemon import find_daemon
@@ -30,17 +32,17 @@ from .info import SessionInfo
 from .session import Session
 from .transfer import ImportResult
 
-_EXIT_ERROR, _EXIT_INTERRUPTED = 1, 130
+_EXIT_ERROR, _EXIT_USAGE, _EXIT_INTERRUPTED = 1, 2, 130
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs one command; returns the exit code."""
-    parser = make_parser()
-    args, rest = parser.parse_known_args(arguments)
-    if rest and args.run is not _serve:
-        parser.error(f"unrecognized arguments: {' '.join(rest)}")
-    _check_together(parser, args)
-    args.rest = rest
+    arguments = sys.argv[1:] if arguments is None else arguments
+    try:
+        args = _parse(arguments)
+    except UsageError as error:
+        print(_usage_line(error, as_json="--json" in arguments), file=sys.stderr)
+        return _EXIT_USAGE
     try:
         return int(args.run(args) or 0)
     except BrokenPipeError:  # whoever read the output has seen enough
@@ -55,7 +57,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def make_parser() -> argparse.ArgumentParser:
     """The command line; ``args.run(args)`` does what was asked for."""
-    parser = argparse.ArgumentParser(
+    parser = CommandParser(
         prog="dynmesh",
         description="Named mesh sessions in a dynmesh daemon.",
         epilog="The daemon is found by --target, else by the environment variable DYNMESH_TARGET.",
@@ -73,6 +75,16 @@ def make_parser() -> argparse.ArgumentParser:
     _add_reading(commands)
     _add_query(commands)
     return parser
+
+
+def _parse(arguments: Sequence[str]) -> argparse.Namespace:
+    """What was asked for. Raises `UsageError`."""
+    parser = make_parser()
+    args, args.rest = parser.parse_known_args(arguments)
+    if args.rest and args.run is not _serve:
+        parser.error(f"unrecognized arguments: {' '.join(args.rest)}")
+    _check_together(parser, args)
+    return args
 
 
 def _add_common(parser: argparse.ArgumentParser) -> None:
@@ -141,7 +153,7 @@ def _add_writing(commands: Any) -> None:
     for name, text in (("undo", "Take the last batches of edits back."), ("redo", "Do undone batches again.")):
         step = _command(commands, name, _undo if name == "undo" else _redo, text)
         step.add_argument("name", metavar="NAME")
-        step.add_argument("count", metavar="N", nargs="?", type=_positive, default=1, help="batches (1)")
+        step.add_argument("count", metavar="N", nargs="?", type=positive, default=1, help="batches (1)")
         _add_if_revision(step)
     remove = _command(commands, "rm", _rm, "Delete a session. Asks first when typed at a terminal.")
     remove.add_argument("name", metavar="NAME")
@@ -183,7 +195,7 @@ def _add_reading(commands: Any) -> None:
     add_check(checking)
     follow = _command(commands, "watch", _watch, "Follow a session: a line for each step, until interrupted.")
     follow.add_argument("name", metavar="NAME")
-    follow.add_argument("--count", metavar="N", type=_positive, help="end after so many steps")
+    follow.add_argument("--count", metavar="N", type=positive, help="end after so many steps")
     follow.add_argument("--codec", choices=("auto", "draco", "zstd", "raw"), default="auto", help="(auto)")
     follow.add_argument(
         "--min-interval", metavar="SECONDS", type=float, default=0.0, help="between steps (0)"
@@ -259,14 +271,15 @@ def _store(args: argparse.Namespace) -> None:
 
 def _operate(args: argparse.Namespace) -> None:
     with _client(args) as client:
-        record, text = operate(client.session(args.name), args)
-    _print(args, record, text)
+        result = operate(client.session(args.name), args)
+    print_warnings(result.warnings)
+    _print(args, operator_record(result), describe_operators(result, args))
 
 
 def _repair(args: argparse.Namespace) -> None:
     with _client(args) as client:
         result = repair(client.session(args.name), args)
-    _print(args, repair_record(result), describe_repair(result))
+    _print(args, repair_record(result), describe_repair(result, args))
 
 
 def _set_checks(args: argparse.Namespace) -> None:
@@ -363,12 +376,6 @@ def _confirmed(question: str) -> bool:
         return False
 
 
-def _positive(text: str) -> int:
-    if (number := int(text)) < 1:
-        raise argparse.ArgumentTypeError(f"{text} is not a positive number")
-    return number
-
-
 def _relation(text: str) -> tuple[str, str] | None:
     if text == "none":
         return None
@@ -391,14 +398,18 @@ def _error_line(error: BaseException, *, as_json: bool) -> str:
     return json.dumps({"error": record})
 
 
+def _usage_line(error: UsageError, *, as_json: bool) -> str:
+    return _error_line(error, as_json=True) if as_json else f"{error.usage}{error.prog}: error: {error}"
+
+
 def _print(args: argparse.Namespace, value: Any, text: str) -> None:
     print(json.dumps(value) if args.json else text, flush=True)
 
 
 def _print_import(args: argparse.Namespace, result: ImportResult) -> None:
-    for warning in result.warnings:
-        print(f"dynmesh: warning: {warning}", file=sys.stderr)
-    _print_info(args, result.info)
+    print_warnings(result.warnings)
+    record = {**result.info.to_dict(), "warnings": warning_records(result.warnings)}
+    _print(args, record, _describe(result.info))
 
 
 def _print_history(args: argparse.Namespace, did: str, result: HistoryResult) -> None:

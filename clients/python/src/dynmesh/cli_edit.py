@@ -9,10 +9,13 @@ from typing import Any
 import numpy as np
 
 from .arrays import Ids
+from .cli_warnings import warning_records
 from .edit_result import EditResult
 from .session import Session
 
 AddCommand = Callable[[str, str], argparse.ArgumentParser]
+
+_NO_VERTEX = 0xFFFFFFFF  # in `EditResult.new_vertices`, of a split that was passed over
 
 
 def add_operators(add: AddCommand) -> None:
@@ -28,6 +31,10 @@ def add_operators(add: AddCommand) -> None:
     _add_places(swap, "edges, or faces", ends=True)
     swap.add_argument("--faces", action="store_true", help="IDs are faces between two tetrahedra")
     smooth = add("smooth", "Move vertices to where the elements round them are better.")
+    smooth.epilog = (
+        "A batch may look at 200,000,000 entities (max_batch_work): the vertices, times their elements, times the "
+        "iterations. Of one that is refused for it, take fewer iterations or vertices at a time."
+    )
     _add_places(smooth, "vertices (all: up to a million, times the iterations)", ends=False, at_least_one=False)
     smooth.add_argument("--method", choices=("guarded", "laplacian", "optimizing"), default="guarded", help="(guarded)")
     smooth.add_argument("--iterations", metavar="N", type=int, default=1, help="(1)")
@@ -48,14 +55,14 @@ def add_operators(add: AddCommand) -> None:
         parser.set_defaults(operate=operate)
 
 
-def operate(session: Session, args: argparse.Namespace) -> tuple[dict[str, Any], str]:
-    """Carries out a command; the result for programs and for humans."""
+def operate(session: Session, args: argparse.Namespace) -> EditResult:
+    """Carries out a command."""
     tx = session.edit(
         if_revision=args.if_revision, validate_only=args.dry_run, skip_refused=args.skip_refused
     )
     with tx:
         args.operate(session, tx, args)
-    return _record(tx.result), _describe(tx.result, args)
+    return tx.result
 
 
 def _add_places(
@@ -113,11 +120,12 @@ def _merge(_: Session, tx: Any, args: argparse.Namespace) -> None:
     tx.merge_vertices(np.array(args.ids).reshape(-1, 2), **_limits(args))
 
 
-def _record(result: EditResult) -> dict[str, Any]:
+def operator_record(result: EditResult) -> dict[str, Any]:
+    """The result for programs."""
     return {
         "revision": result.revision,
         "counts": result.counts._asdict(),
-        "new_vertices": result.new_vertices.tolist(),
+        "new_vertices": [None if id_ == _NO_VERTEX else id_ for id_ in result.new_vertices.tolist()],
         "moved": sum(result.num_moved),
         "skipped": _skipped(result).tolist(),
         "refusals": [
@@ -125,13 +133,15 @@ def _record(result: EditResult) -> dict[str, Any]:
             for refusals in result.refusals
             for refusal in refusals
         ],
+        "warnings": warning_records(result.warnings),
     }
 
 
-def _describe(result: EditResult, args: argparse.Namespace) -> str:
+def describe_operators(result: EditResult, args: argparse.Namespace) -> str:
+    """The result for humans."""
     counts = ", ".join(f"{count} {name}" for name, count in result.counts._asdict().items())
     lines = [f"{'would be' if args.dry_run else 'revision'} {result.revision}: {counts}"]
-    made = result.new_vertices[result.new_vertices != np.uint32(0xFFFFFFFF)]
+    made = result.new_vertices[result.new_vertices != _NO_VERTEX]
     if len(made):
         lines.append(f"new vertices: {' '.join(map(str, made))}")
     if sum(result.num_moved):

@@ -7,6 +7,7 @@ import re
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from .cli_parser import ids
 from .session import Session
 
 # What is printed with --json, and without.
@@ -55,7 +56,7 @@ def _add_neighbors(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("name", metavar="NAME")
     parser.add_argument("from_kind", metavar="FROM", choices=_KINDS)
     parser.add_argument("to_kind", metavar="TO", choices=_KINDS)
-    parser.add_argument("--ids", metavar="ID,...", type=_ids, help="of these (default: of all)")
+    parser.add_argument("--ids", metavar="ID,...", type=ids, help="of these (default: of all)")
     parser.add_argument("--rings", metavar="N", type=int, default=1, help="in at most so many steps (1)")
     parser.add_argument("--boundary", action="store_true", help="only of those on the boundary")
     parser.add_argument("--box", metavar=_BOX, nargs=6, type=float, help="only of those in this box")
@@ -93,15 +94,14 @@ def _neighbors(session: Session, args: argparse.Namespace) -> Answer:
 
 def _box(session: Session, args: argparse.Namespace) -> Answer:
     found, revision = session._in_box(args.kind, _corners(_numbers(args, _BOX)))
-    ids = found.tolist()
-    return {"revision": revision, "ids": ids}, "\n".join(map(str, ids))
+    return {"revision": revision, "ids": found.tolist()}, "\n".join(map(str, found.tolist()))
 
 
 def _nearest(session: Session, args: argparse.Namespace) -> Answer:
     found = session.nearest_vertices(_numbers(args, _POINT), args.count)
-    ids, distances = found.ids.tolist(), found.distances.tolist()
-    lines = [f"{vertex} at distance {distance:g}" for vertex, distance in zip(ids, distances)]
-    return {"revision": found.revision, "ids": ids, "distances": distances}, "\n".join(lines)
+    near, distances = found.ids.tolist(), found.distances.tolist()
+    lines = [f"{vertex} at distance {distance:g}" for vertex, distance in zip(near, distances)]
+    return {"revision": found.revision, "ids": near, "distances": distances}, "\n".join(lines)
 
 
 def _locate(session: Session, args: argparse.Namespace) -> Answer:
@@ -125,7 +125,3 @@ def _ray(session: Session, args: argparse.Namespace) -> Answer:
 
 def _corners(numbers: list[float]) -> list[list[float]]:
     return [numbers[:3], numbers[3:]]
-
-
-def _ids(text: str) -> list[int]:
-    return [int(part) for part in text.split(",") if part]

@@ -62,9 +62,9 @@ def repair_record(result: RepairResult) -> dict[str, Any]:
     return {"revision": result.revision, "counts": result.counts._asdict(), "steps": steps}
 
 
-def describe_repair(result: RepairResult) -> str:
+def describe_repair(result: RepairResult, args: argparse.Namespace) -> str:
     """The result for humans."""
-    lines = [f"revision {result.revision}"]
+    lines = [f"{'would be done at ' if args.dry_run else ''}revision {result.revision}"]
     for step in result.steps:
         found = ", ".join(f"{found.count} {name.replace('_', ' ')}" for name, found in step.findings.items())
         lines.append(f"{step.step.name.replace('_', ' ')}: {found or 'nothing'}")

@@ -68,6 +68,19 @@ class MeshWarning:
     def __str__(self) -> str:
         return f"{self.message} [{self.reason}] ({self.count} {self.kind}(s))"
 
+    def to_dict(self) -> dict[str, Any]:
+        """The same in the types of JSON."""
+        return {
+            "reason": self.reason,
+            "message": self.message,
+            "kind": str(self.kind),
+            "ids": self.ids.tolist(),
+            "count": self.count,
+            "check": self.check,
+            "threshold": self.threshold,
+            "values": self.values.tolist(),
+        }
+
 
 @dataclass(frozen=True)
 class SessionInfo:
