@@ -65,8 +65,10 @@ def test_refusals_say_why(session):
         session.adapt()
     with pytest.raises(dynmesh.InvalidArgumentError):
         session.adapt(1.0, size_attribute="size")
-    with pytest.raises(dynmesh.InvalidArgumentError):
-        session.adapt(-1.0)
+    for length in (0, 0.0, -1.0):
+        with pytest.raises(dynmesh.InvalidArgumentError, match="a target length is positive and finite") as refused:
+            session.adapt(length)
+        assert refused.value.metadata["field"] == "target_length"
 
 
 def test_smoothing_moves_what_is_asked_for(session):

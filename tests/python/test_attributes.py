@@ -4,7 +4,7 @@ import dynmesh
 import meshio
 import numpy as np
 import pytest
-from dynmesh.columns import as_values
+from dynmesh.columns import as_values, point_columns
 from shapes import TET, two_tets
 
 
@@ -40,6 +40,9 @@ def test_what_would_change_is_refused_by_the_name_of_the_column(values):
     with pytest.raises(dynmesh.InvalidArgumentError, match="'stress'") as caught:
         as_values(values, "stress")
     assert caught.value.metadata == {"attribute": "stress"}
+    assert "`attributes`" not in caught.value.message  # which only imports have
+    with pytest.raises(dynmesh.InvalidArgumentError, match="naming the others in `attributes`"):
+        point_columns({"stress": values}, None)
 
 
 @pytest.mark.parametrize("dtype", COLUMN_DTYPES)
@@ -75,7 +78,7 @@ def test_a_default_is_the_row_of_whoever_has_none(session, codec):
             late.wait(5, timeout=20)
             for mirror in (early, late):
                 assert mirror.attribute("t", "vertex").tolist() == 4 * [[0.5, -1]] + [[3, 4]]
-                assert mirror.attribute("q", "edge").size == 0
+                assert mirror.attribute("q", "edge").tolist() == [[-7]]
                 assert mirror.to_meshio().cell_data["q"][0].tolist() == [-7]
     assert session.to_meshio().point_data["t"].tolist() == 4 * [[0.5, -1]] + [[3, 4]]
     assert session.info().attributes == (
@@ -222,6 +225,30 @@ def test_rows_follow_their_entities_into_a_mirror(session):
             tx.add_vertices([[1, 1, 1]])
         mirror.wait(4, timeout=20)
         assert mirror.attribute("t", "vertex")[:, 0].tolist() == [0, 10, 0, 0]
+
+
+def test_rows_of_a_mirror_are_gathered_by_the_slots_of_positions_and_elements(session):
+    session.import_mesh(TET, {"tetra": [[0, 1, 2, 3]], "line": [[0, 1]]})
+    with session.mirror() as mirror:
+        with session.edit() as tx:
+            tx.add_attribute("t", "vertex", np.float32, 2, default=[1, 2])
+            tx.add_attribute("c", "cell", np.uint8, default=9)
+            tx.add_attribute("q", "edge", np.int64, default=-7)
+            tx.set_attribute("t", "vertex", [1], [[3, 4]])
+        mirror.wait(2, timeout=20)
+        with mirror.lock:
+            corners = mirror.attribute("t", "vertex")[mirror.elements("cell").vertices[0]]
+        assert corners.tolist() == [[1, 2], [3, 4], [1, 2], [1, 2]]
+        with session.edit() as tx:
+            new = tx.add_vertices([[0, 0, 2], [0, 0, 3]])
+            tx.add_elements("tetra", [[0, 1, new[0], new[1]]])
+            tx.set_attribute("q", "edge", [5], [50])  # of no element
+        mirror.wait(3, timeout=20)
+        with mirror.lock:
+            assert mirror.attribute("t", "vertex").tolist()[4:] == [[1, 2], [1, 2]]
+            assert len(mirror.attribute("t", "vertex")) == len(mirror.positions) == 6
+            assert mirror.attribute("c", "cell").tolist() == [[9], [9]]
+            assert mirror.attribute("q", "edge")[:, 0].tolist() == [-7, -7, -7, -7, -7, 50]
 
 
 def test_a_column_that_is_not_there_and_one_that_is_twice(session):

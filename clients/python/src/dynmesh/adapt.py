@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from .arguments import as_count, as_number, as_text
+from .arguments import as_count, as_number, as_text, bad_argument
 from .errors import InternalError, InvalidArgumentError
 from .progress import Progress
 from .v1 import adapt_pb2
@@ -110,9 +110,12 @@ def adapt_request(
     """The request of `Session.adapt`, whose parameters these are."""
     if (target_length is None) == (size_attribute is None):
         raise InvalidArgumentError("say either target_length or size_attribute", reason="BAD_ARGUMENT")
+    length = None if target_length is None else as_number(target_length, "target_length")
+    if length == 0:  # which the message has for none
+        raise bad_argument("target_length", "a target length is positive and finite")
     return adapt_pb2.AdaptSessionRequest(
         session=session,
-        target_length=None if target_length is None else as_number(target_length, "target_length"),
+        target_length=length,
         size_attribute=None if size_attribute is None else as_text(size_attribute, "size_attribute"),
         min_quality=as_number(min_quality, "min_quality"),
         feature_angle=as_number(feature_angle, "feature_angle"),

@@ -25,6 +25,9 @@ from .v1 import types_pb2
 SLOT_COLUMN = "dynmesh:slot"
 
 _MAX_COMPONENTS = 16
+# What to do about values that no column can hold: of one that is set, and of one of many that are imported.
+_CONVERT = "convert it"
+_LEAVE_OUT = "convert it, or leave it out by naming the others in `attributes`"
 _NOT_IN_NAMES = re.compile(r"[^A-Za-z0-9_.-]")
 
 
@@ -81,28 +84,28 @@ def values_from_proto(message: types_pb2.AttributeValues) -> NDArray[Any]:
     return flat.reshape(-1, message.spec.components or 1)
 
 
-def as_values(values: ArrayLike, name: str) -> NDArray[Any]:
+def as_values(values: ArrayLike, name: str, advice: str = _CONVERT) -> NDArray[Any]:
     """`values` as [n, components], exactly, in the nearest type that columns can have.
 
     float16 becomes float32; booleans uint8; int8, int16 and uint16 int32; uint32 int64, and uint64 if every
-    value fits. Raises `InvalidArgumentError` otherwise, and for more than 16 components.
+    value fits. Raises `InvalidArgumentError` with `advice` otherwise, and for more than 16 components.
     """
     array = as_array(values, "values")
     rows = array.reshape(-1, 1) if array.ndim == 1 else array
     if rows.ndim != 2 or not 1 <= rows.shape[1] <= _MAX_COMPONENTS:
-        raise _unfit(name, f"has shape {array.shape}; columns have shape (n,) or (n, 1 to {_MAX_COMPONENTS})")
+        raise _unfit(name, f"has shape {array.shape}; columns have shape (n,) or (n, 1 to {_MAX_COMPONENTS})", advice)
     dtype = _nearest(rows.dtype)
     if dtype is None:
-        raise _unfit(name, f"is {rows.dtype}; columns are {DTYPE_NAMES}")
+        raise _unfit(name, f"is {rows.dtype}; columns are {DTYPE_NAMES}", advice)
     if rows.dtype == np.uint64 and rows.size and int(rows.max()) > np.iinfo(np.int64).max:
-        raise _unfit(name, "is uint64 with values that int64 cannot hold")
+        raise _unfit(name, "is uint64 with values that int64 cannot hold", advice)
     return rows.astype(dtype, copy=False)
 
 
 def point_columns(data: dict[str, ArrayLike], wanted: Collection[str] | None) -> list[Column]:
     """A mesh's point_data as columns; `wanted`: names of those to take, None for all."""
     names = _names(data, wanted)
-    return [Column(names[key], EntityKind.VERTEX, as_values(data[key], key)) for key in names]
+    return [Column(names[key], EntityKind.VERTEX, as_values(data[key], key, _LEAVE_OUT)) for key in names]
 
 
 def cell_columns(
@@ -115,7 +118,7 @@ def cell_columns(
     columns = []
     for key, name in _names(data, wanted).items():
         for kind in sorted({kind for kind in kinds if kind is not None}):
-            blocks = [as_values(v, key) for v, k in zip(data[key], kinds, strict=True) if k == kind]
+            blocks = [as_values(v, key, _LEAVE_OUT) for v, k in zip(data[key], kinds, strict=True) if k == kind]
             columns.append(Column(name, kind, _join(blocks, key)))
     return columns
 
@@ -172,9 +175,9 @@ def _bad_field(name: str, field: str, what: str) -> InvalidArgumentError:
     return InvalidArgumentError(f"column {name!r} {what}", reason="BAD_ARGUMENT", metadata=metadata)
 
 
-def _unfit(name: str, what: str) -> InvalidArgumentError:
+def _unfit(name: str, what: str, advice: str = _LEAVE_OUT) -> InvalidArgumentError:
     return InvalidArgumentError(
-        f"column {name!r} {what}: convert it, or leave it out by naming the others in `attributes`",
+        f"column {name!r} {what}: {advice}",
         reason="BAD_ARGUMENT",
         metadata={"attribute": name},
     )

@@ -146,7 +146,11 @@ class Mirror:
         return Elements(frozen(table.types), frozen(table.vertices))
 
     def attribute(self, name: str, kind: KindLike) -> NDArray[Any]:
-        """Rows of an attribute by slot: [size, components] of its type; those beyond are its default row.
+        """Rows of an attribute by slot: [size, components] of its type, the default row where none was ever set.
+
+        There is a row for each slot of `positions`, or of `elements` of the kind. Faces and edges that are no elements
+        are not part of a mirror, their rows are: `size` is larger where one of them has a row beyond those, and slots
+        from `size` on have the default row. Where no entity stands a row means nothing.
 
         Raises KeyError if there is no such column.
         """

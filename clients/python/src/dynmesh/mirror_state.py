@@ -69,6 +69,8 @@ class MirrorState:
         self.vertices.apply(delta.removed_vertices, delta.vertex_slots, delta.positions)
         for rows in delta.attributes:
             self._apply_attribute(rows)
+        for table in self.attributes.values():
+            table.reach(self._size(table.kind))
         self.quantized = self.quantized or delta.position_bits > 0
         if delta.consistent:
             self._verify(delta)
@@ -87,6 +89,10 @@ class MirrorState:
         if key not in self.attributes:
             self.attributes[key] = AttributeTable(changes)
         self.attributes[key].apply(changes)
+
+    def _size(self, kind: EntityKind) -> int:
+        """Slots that were ever taken."""
+        return self.vertices.size if kind == EntityKind.VERTEX else self.elements[kind].size
 
     def _verify(self, delta: Delta) -> None:
         self.revision = delta.to_revision
@@ -249,9 +255,13 @@ class AttributeTable:
         """Writes rows at slots."""
         if not changes.slots.size:
             return
-        self.size = max(self.size, int(changes.slots[-1]) + 1)
-        self._values = _grown(self._values, self.size, self.default)
+        self.reach(int(changes.slots[-1]) + 1)
         self._values[changes.slots] = changes.values
+
+    def reach(self, size: int) -> None:
+        """Has at least so many rows: new ones are the default."""
+        self.size = max(self.size, size)
+        self._values = _grown(self._values, self.size, self.default)
 
     def attribute(self) -> Attribute:
         """A copy of the rows that are not the default, for a snapshot."""
