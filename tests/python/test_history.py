@@ -89,6 +89,15 @@ def test_a_retry_is_undone_once(session):
     assert session.info().undoable_batches == 1
 
 
+def test_an_undo_that_is_only_validated_tells_what_would_be(session):
+    before = session.info()
+    add_vertex(session, 1.0)
+    told = session.undo(validate_only=True)
+    assert (told.checksum, told.counts) == (before.checksum, before.counts)
+    assert (told.revision, told.count, told.undoable_batches, told.redoable_batches) == (2, 1, 1, 0)
+    assert session.counts.vertices == before.counts.vertices + 1
+
+
 def test_editors_in_one_place_do_not_overwrite_each_other(session):
     read_at = session.info().revision
     with session.edit() as tx:
@@ -104,6 +113,20 @@ def test_editors_in_one_place_do_not_overwrite_each_other(session):
     with session.edit(as_of_revision=read_at, conflict_policy="touched") as tx:
         tx.move_vertices([1], [[1.5, 0.0, 0.0]])
     assert tx.result.revision == read_at + 2
+
+
+def test_batches_of_ones_own_conflict_too_and_edges_that_are_gone_are_not_found(session):
+    read_at = session.info().revision
+    touched = {"as_of_revision": read_at, "conflict_policy": "touched"}
+    with session.edit(**touched) as tx:
+        tx.move_vertices([0], [[0.0, 0.0, -0.5]])
+        tx.remove_elements("cell", [1])
+    with pytest.raises(dynmesh.ConflictError):
+        with session.edit(**touched) as tx:
+            tx.move_vertices([0], [[0.0, 0.0, -1.0]])
+    with pytest.raises(dynmesh.NotFoundError, match="UNKNOWN_ENTITY"):
+        with session.edit(**touched) as tx:
+            tx.split_edges(ends=[[1, 4]])
 
 
 def test_a_stream_of_edits_tells_conflicts_apart(session):

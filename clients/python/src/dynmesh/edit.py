@@ -331,7 +331,9 @@ class EditBatch:
             Of the way to the mean that is tried first, above 0 and at most 1. Of "optimizing": of the first step, a
             quarter of the mean length of the vertex's edges.
         iterations : int
-            How often all are gone through, 1 to 1000.
+            How often all are gone through, 1 to 1000. A million vertices, and 200,000,000 entities that are looked
+            at (``max_batch_work``), are what a batch may have of all iterations together: of larger meshes take a
+            batch for each iteration, or for parts of the vertices.
         move_boundary : bool
             Vertices on the boundary move too, towards their neighbours along it.
         tangential : bool

@@ -128,9 +128,9 @@ class HistoryResult:
     count : int
         Batches that were undone or redone.
     checksum, counts : Checksum, Counts
-        Of the session then.
+        Of the session then; of ``validate_only`` what they would be.
     undoable_batches, redoable_batches : int
-        What can be undone and redone now.
+        What can be undone and redone then; of ``validate_only`` before.
     """
 
     revision: int

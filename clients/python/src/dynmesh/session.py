@@ -192,7 +192,9 @@ class Session(SessionChanges):
     ) -> Transaction:
         """A batch of edits, sent as one revision when its ``with`` block ends without an exception.
 
-        The server limits its size: 4 MiB unless told otherwise, which is some 200,000 tetrahedra.
+        The server limits its size: 4 MiB unless told otherwise, which is some 200,000 tetrahedra. What operators and
+        checks look at is limited, too, to 200,000,000 entities each (LIMIT_EXCEEDED max_batch_work), as nobody else
+        can edit meanwhile: name fewer items, smooth in fewer iterations, or make several batches of it.
 
         Parameters
         ----------
@@ -206,15 +208,17 @@ class Session(SessionChanges):
         validate_only : bool
             Check, and compute the result, but change nothing.
         skip_refused : bool
-            Pass over items of splits, collapses and swaps that the mesh refuses: see `EditResult.skipped`.
-            Other edits stay all or nothing.
+            Pass over items of operators, from `split_edges` to `smooth_vertices`, that the mesh refuses: see
+            `EditResult.skipped`. Other edits stay all or nothing.
         report_lineage : bool
-            Tell which elements splits, collapses and swaps made of which: see `EditResult.lineage`.
+            Tell which elements operators made of which: see `EditResult.lineage`.
         conflict_policy : "ignore" or "touched"
-            "touched": refused with `ConflictError` when somebody else changed, after ``as_of_revision``, what the
-            batch touches: what it removes, moves or sets attributes of, and vertices of elements that it adds. So
-            editors in different regions never refuse each other, and in the same one no change is overwritten.
-            With ``skip_refused``, items of splits, collapses and swaps that conflict are passed over.
+            "touched": refused with `ConflictError` when another batch changed, after ``as_of_revision``, what this
+            one touches: what it removes, moves or sets attributes of, and vertices of elements that it adds. So
+            editors in different regions never refuse each other, and in the same one no change is overwritten. Your
+            own batches count as others, too: go on with the revision of the last one. An edge named by its ends
+            that is gone is `NotFoundError` UNKNOWN_ENTITY all the same.
+            With ``skip_refused``, items of operators that conflict are passed over.
         """
         options = {
             "as_of_revision": as_of_revision,

@@ -103,7 +103,9 @@ class SessionChanges(SessionChecks):
         Parameters
         ----------
         if_revision, request_id, validate_only
-            As in `edit`. ``if_revision`` makes sure that nobody's batch came last but the one that is meant.
+            As in `edit`. ``if_revision`` makes sure that nobody's batch came last but the one that is meant. With
+            ``validate_only`` the result has the checksum and counts that would be, and the revision and the batches
+            that can be undone and redone of before.
 
         Raises
         ------
