@@ -11,6 +11,7 @@ namespace dynmesh {
 struct Mesh::CellParts {
   std::array<EdgeId, kMaxElementEdges> edges;
   std::array<FaceMatch, kMaxElementFaces> faces;
+  bool all_looked_for = false;  ///< edges that are invalid are not there
 
   /// Names the edges of the i-th face, which was found and has `of_face`.
   void TakeEdges(const ElementTemplate& shape, int i, absl::Span<const EdgeId> of_face) {

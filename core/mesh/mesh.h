@@ -355,6 +355,10 @@ class Mesh {
   void PrefetchFace(FaceId f) const;
   void PrefetchCell(CellId c) const;
   void PrefetchEdges(FaceId f, int step) const;
+  void PrefetchNeighbors(VertexId v) const;
+  void PrefetchRound(FaceId f, int stage) const;
+  template <typename Lower, typename Upper>
+  VertexId OppositeOf(Lower lower, Upper upper) const;
 
   // mesh_replace.cc
   absl::StatusOr<EntityId> AddNear(const NewElement& element, Nearby& nearby);

@@ -254,8 +254,10 @@ absl::StatusOr<EntityId> Mesh::AddFaceElement(VertexSpan vertices, FaceEdges& ed
   }
   const bool equals_element = match.face.valid() && IsElement(match.face);
   if (equals_element && options_.duplicates == DuplicatePolicy::kRefuse) return RefuseDuplicate(match.face);
+  const bool look_again = HasRepeats(vertices);  // two of its edges may be the same
   for (size_t k = 0; k < n; ++k) {
-    if (!edges[k].valid()) edges[k] = EnsureEdge(vertices[k], vertices[(k + 1) % n]);
+    const VertexId a = vertices[k], b = vertices[(k + 1) % n];
+    if (!edges[k].valid()) edges[k] = look_again ? EnsureEdge(a, b) : CreateEdge(a, b, 0);
   }
   WidenFaces(n);
   return CreateFace(vertices, absl::MakeConstSpan(edges.data(), n),
@@ -282,10 +284,11 @@ absl::StatusOr<EntityId> Mesh::AddCell(ElementType type, VertexSpan vertices, Ce
 
 void Mesh::EnsureCellParts(const ElementTemplate& shape, VertexSpan vertices, CellParts& parts) {
   const bool degenerate = HasRepeats(vertices);
+  const bool look_again = degenerate || !parts.all_looked_for;
   for (int e = 0; e < shape.num_edges; ++e) {
-    const LocalEdge& ends = shape.edges[e];
-    if (!parts.edges[e].valid())
-      parts.edges[e] = EnsureEdge(vertices[ends.vertices[0]], vertices[ends.vertices[1]]);
+    if (parts.edges[e].valid()) continue;
+    const VertexId a = vertices[shape.edges[e].vertices[0]], b = vertices[shape.edges[e].vertices[1]];
+    parts.edges[e] = look_again ? EnsureEdge(a, b) : CreateEdge(a, b, 0);
   }
   for (int i = 0; i < shape.num_faces; ++i) {
     if (parts.faces[i].face.valid()) continue;

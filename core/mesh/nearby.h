@@ -134,6 +134,7 @@ class Mesh::Nearby {
       parts.edges[e] = match.edge;
       new_edges |= uint32_t{match.is_new} << e;
     }
+    parts.all_looked_for = true;
     for (int i = 0; i < shape.num_faces; ++i) {
       if (!parts.faces[i].face.valid()) parts.faces[i] = FindFarFace(shape.faces[i], cell, parts, new_edges);
     }

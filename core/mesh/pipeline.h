@@ -1,6 +1,7 @@
 #ifndef DYNMESH_CORE_MESH_PIPELINE_H_
 #define DYNMESH_CORE_MESH_PIPELINE_H_
 
+#include <algorithm>
 #include <cstddef>
 
 namespace dynmesh {
@@ -11,10 +12,11 @@ namespace dynmesh {
 template <typename... Stages>
 void Pipeline(size_t count, Stages... stages) {
   constexpr size_t kAhead = 6;  // covers the latency of memory; few enough for the first-level cache
-  constexpr size_t kLag = kAhead * (sizeof...(Stages) - 1);
-  for (size_t step = 0; step < count + kLag; ++step) {
+  const size_t ahead = std::min(kAhead, count);
+  const size_t lag = ahead * (sizeof...(Stages) - 1);
+  for (size_t step = 0; step < count + lag; ++step) {
     size_t i = step;  // below 0 it wraps beyond count
-    ((i < count ? stages(i) : void(), i -= kAhead), ...);
+    ((i < count ? stages(i) : void(), i -= ahead), ...);
   }
 }
 

@@ -47,7 +47,7 @@ class PooledLists {
   uint32_t Length(Slot slot) const { return slot < lists_.size() ? lists_[slot].length : 0; }
 
   /// Whether `count` entries more have room within the 32-bit limits, whatever list they go to.
-  bool HasRoom(uint32_t count) const { return longest_ + count <= kMaxLength && pool_.size() < kMaxPool; }
+  bool HasRoom(uint32_t count) const { return longest_ + count <= kMaxLength && end_ < kMaxPool; }
 
   /// `first_room`: room that an empty list is given, 1-8; what most lists will need saves them moves.
   void PushBack(Slot slot, T value, uint32_t first_room = 2) {
@@ -90,6 +90,7 @@ class PooledLists {
       offset += Capacity(lists_[i].size_class);
       longest_ = std::max(longest_, lengths[i]);
     }
+    end_ = offset;
     pool_.reserve(offset + offset / 16 + kReadable);
     pool_.resize(offset + kReadable);
   }
@@ -117,6 +118,8 @@ class PooledLists {
   static constexpr int kNumClasses = 64;
   static constexpr uint32_t kSpareClasses = 3;  ///< so much larger may a recycled room be
   static constexpr uint64_t kMaxPool = 0xf0000000u;
+  static constexpr size_t kGrowth = 1024;  ///< entries: rooms are many and small
+  static_assert(kGrowth >= kReadable);
 
   static constexpr std::array<uint32_t, kNumClasses> MakeCapacities() {
     std::array<uint32_t, kNumClasses> capacities{};
@@ -161,7 +164,7 @@ class PooledLists {
     if (new_class == old.size_class) return;
     List& list = lists_[slot];
     new_class == 0 ? LeaveRoom(list) : TakeRoom(new_class, spare, list);
-    std::copy_n(pool_.data() + old.offset, old.length, pool_.data() + list.offset);
+    CopyEntries(pool_.data() + old.offset, old.length, pool_.data() + list.offset);
     if (old.size_class != 0) free_rooms_[old.size_class].push_back(old.offset);
   }
 
@@ -180,14 +183,31 @@ class PooledLists {
       list.size_class = c;
       return rooms.pop_back();
     }
-    const size_t offset = pool_.size() - kReadable;
-    pool_.resize(pool_.size() + Capacity(size_class));
-    list.offset = offset;
+    const uint64_t end = end_ + Capacity(size_class);
+    if (end + kReadable > pool_.size()) pool_.resize(end + kGrowth);
+    list.offset = end_;
     list.size_class = size_class;
+    end_ = end;
+  }
+
+  /// Rooms do not overlap. Short lists without a call: the first and the last entries, which may be the same.
+  static void CopyEntries(const T* from, size_t length, T* to) {
+    if (length > kSmallClasses) {
+      std::copy_n(from, length, to);
+    } else if (length >= 4) {
+      std::copy_n(from, 4, to);
+      std::copy_n(from + length - 4, 4, to + length - 4);
+    } else if (length >= 2) {
+      std::copy_n(from, 2, to);
+      std::copy_n(from + length - 2, 2, to + length - 2);
+    } else if (length == 1) {
+      *to = *from;
+    }
   }
 
   std::vector<List> lists_;
-  std::vector<T> pool_ = std::vector<T>(kReadable);  ///< rooms, then kReadable entries of none
+  std::vector<T> pool_ = std::vector<T>(kReadable);  ///< rooms, then at least kReadable entries of none
+  uint64_t end_ = 0;                                 ///< of all rooms
   uint32_t longest_ = 0;                             ///< length of the longest list so far
   std::array<std::vector<uint32_t>, kNumClasses> free_rooms_;
 };

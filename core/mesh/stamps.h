@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/mesh/ids.h"
+#include "core/mesh/pipeline.h"
 
 namespace dynmesh {
 
@@ -44,6 +45,9 @@ class StampColumn {
   void Restore(Slot slot, Stamp stamp) {
     if (slot < stamps_.size()) stamps_[slot] = stamp;
   }
+
+  /// Asks memory for the stamp of a slot.
+  void PrefetchStamp(Slot slot) const { Prefetch(stamps_.data() + slot); }
 
   void Reserve(size_t slots) {
     stamps_.reserve(slots);

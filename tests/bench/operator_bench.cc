@@ -1,10 +1,14 @@
 // Edit operators at random places, as one batch: each planned, checked and carried out, with edges, faces,
 // boundary, stamps and checksums kept current. `.../by_elements` does the same by removing elements and
-// adding others.
+// adding others. `.../batches` are large batches one after the other, as service_bench.py sends them to a
+// daemon.
 
 #include <benchmark/benchmark.h>
 
+#include <algorithm>
 #include <memory>
+#include <numeric>
+#include <random>
 
 #include "core/edit/transaction.h"
 #include "tests/bench/digest.h"
@@ -83,10 +87,52 @@ void RegisterOperator(const Fixture& fixture, const Operator& op) {
            [patches](Mesh& copy) { ReplaceByElements(copy, *patches); });
 }
 
+/// Random slots of a kind, `kBatch` a batch.
+std::vector<Edit> BatchesOf(const Mesh& mesh, const Operator& op) {
+  constexpr size_t kBatch = 10'000, kBatches = 6;
+  std::vector<Slot> slots(mesh.slots(op.kind).limit());
+  std::iota(slots.begin(), slots.end(), 0);
+  std::shuffle(slots.begin(), slots.end(), std::mt19937(1));
+  slots.resize(std::min(slots.size(), kBatch * kBatches));
+  std::vector<Edit> batches;
+  for (auto begin = slots.begin(); begin != slots.end();) {
+    const auto end = begin + std::min<std::ptrdiff_t>(kBatch, slots.end() - begin);
+    batches.push_back(op.edit({begin, end}));
+    begin = end;
+  }
+  return batches;
+}
+
+/// The first batch, which makes arrays move to where they can grow and frees the first slots, is not timed.
+void RegisterBatches(const Fixture& fixture, const Operator& op) {
+  const auto run = [&fixture, batches = BatchesOf(fixture.mesh, op)](benchmark::State& state) {
+    const BatchOptions options{.skip_refused = true};
+    uint64_t accepted = 0;
+    for (auto _ : state) {
+      state.PauseTiming();
+      auto copy = std::make_unique<Mesh>(fixture.mesh.Clone());
+      Must(ApplyBatch(*copy, absl::MakeConstSpan(batches).first(1), options).status());
+      state.ResumeTiming();
+      for (size_t i = 1; i < batches.size(); ++i) {
+        const BatchResult result = Must(ApplyBatch(*copy, absl::MakeConstSpan(&batches[i], 1), options));
+        accepted += result.results[0].new_slots.size() - result.results[0].skipped.size();
+      }
+      state.PauseTiming();
+      copy.reset();
+      state.ResumeTiming();
+    }
+    state.SetItemsProcessed(accepted);
+  };
+  benchmark::RegisterBenchmark(("edit/" + op.name + "/batches").c_str(), run)->Unit(benchmark::kMillisecond);
+}
+
 }  // namespace
 
 void RegisterOperators(const Fixture& fixture) {
-  for (const Operator& op : OperatorsFor(fixture.input.type)) RegisterOperator(fixture, op);
+  for (const Operator& op : OperatorsFor(fixture.input.type)) {
+    RegisterOperator(fixture, op);
+    if (op.name == "split") RegisterBatches(fixture, op);  // none of it is refused
+  }
 }
 
 }  // namespace dynmesh::bench

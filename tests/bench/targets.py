@@ -81,7 +81,7 @@ def _operators(table, run):
 
 
 def _service(table, run, core):
-    rate = core and core.rate("edit/split")
+    rate = core and core.rate("edit/split/batches")
     table.at_least(f"split, {run.mesh}: rate through the daemon in batches of 10,000 / in process",
                    run.rate("rpc/split/10000") / rate if rate else None, 0.7, report.ratio_text)
     for name in ("adapt/half", "adapt/double"):
