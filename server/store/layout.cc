@@ -2,7 +2,6 @@
 
 #include <xxhash.h>
 
-#include <cassert>
 #include <utility>
 
 #include "absl/strings/escaping.h"
@@ -25,6 +24,7 @@ constexpr char kValueTag = 'v';
 constexpr size_t kSealBytes = sizeof(uint64_t);
 constexpr size_t kTagAt = 1 + sizeof(uint64_t);
 constexpr size_t kSuffixAt = kTagAt + 1;
+constexpr uint64_t kMaxNumber = INT64_MAX;  // of everything that counts, so that one more never overflows
 
 std::string Tag(char tag) { return std::string(1, tag); }
 std::string AfterTag(char tag) { return Tag(static_cast<char>(tag + 1)); }
@@ -47,7 +47,8 @@ std::string SessionKey(SessionId id, char tag) {
   return key;
 }
 
-// No record has the revision after INT64_MAX, but its key sorts after all others, since they are not negative.
+// No record has the revision after INT64_MAX, but its key sorts after all others, since they are not
+// negative.
 std::string KeyAfterRecord(SessionId id, int64_t revision) {
   std::string key = SessionKey(id, kRecordTag);
   AppendOrdered(static_cast<uint64_t>(revision) + 1, key);
@@ -70,7 +71,6 @@ KeyRange Names() { return {Tag(kNameTag), AfterTag(kNameTag)}; }
 absl::string_view NameOfKey(absl::string_view key) { return key.substr(1); }
 
 KeyRange DataOf(SessionId id) {
-  assert(id < UINT64_MAX);
   KeyRange range{Tag(kSessionTag), Tag(kSessionTag)};
   AppendOrdered(id, range.from);
   AppendOrdered(id + 1, range.to);
@@ -110,18 +110,24 @@ KeyRange RecordsOf(SessionId id, int64_t after, int64_t last) {
 
 absl::StatusOr<SessionId> SessionOfKey(absl::string_view key) {
   if (key.size() <= kTagAt) return BadKey(key);
-  return ReadOrdered(key.substr(1));
+  const SessionId id = ReadOrdered(key.substr(1));
+  if (id == 0 || id > kMaxNumber) return BadKey(key);
+  return id;
 }
 
 absl::StatusOr<int64_t> RevisionOfKey(absl::string_view record_key) {
   if (record_key.size() != kSuffixAt + sizeof(int64_t)) return BadKey(record_key);
-  return static_cast<int64_t>(ReadOrdered(record_key.substr(kSuffixAt)));
+  const uint64_t revision = ReadOrdered(record_key.substr(kSuffixAt));
+  if (revision == 0 || revision > kMaxNumber) return BadKey(record_key);
+  return static_cast<int64_t>(revision);
 }
 
 absl::StatusOr<PageVersion> VersionOfKey(absl::string_view page_key) {
   if (page_key.size() != kSuffixAt + 2 * sizeof(uint64_t)) return BadKey(page_key);
-  return PageVersion{ReadOrdered(page_key.substr(kSuffixAt)),
-                     ReadOrdered(page_key.substr(kSuffixAt + sizeof(uint64_t)))};
+  const PageVersion version{ReadOrdered(page_key.substr(kSuffixAt)),
+                            ReadOrdered(page_key.substr(kSuffixAt + sizeof(uint64_t)))};
+  if (version.checkpoint == 0 || version.checkpoint > kMaxNumber) return BadKey(page_key);
+  return version;
 }
 
 std::string Seal(absl::string_view key, std::string payload) {
@@ -136,7 +142,8 @@ absl::StatusOr<absl::string_view> Unseal(absl::string_view key, absl::string_vie
     ByteReader seal(value.substr(payload.size()));
     if (seal.Fixed<uint64_t>() == SealOf(key, payload)) return payload;
   }
-  return StoreDamaged(absl::StrCat("the value of key ", absl::BytesToHexString(key), " is not what was written"));
+  return StoreDamaged(
+      absl::StrCat("the value of key ", absl::BytesToHexString(key), " is not what was written"));
 }
 
 std::string WriteNumber(uint64_t number) {
@@ -148,7 +155,7 @@ std::string WriteNumber(uint64_t number) {
 absl::StatusOr<uint64_t> ReadNumber(absl::string_view payload) {
   ByteReader in(payload);
   const uint64_t number = in.Fixed<uint64_t>();
-  if (!in.done()) return StoreDamaged("a number has another size");
+  if (!in.done() || number > kMaxNumber) return StoreDamaged("a number is none that it writes");
   return number;
 }
 
@@ -165,7 +172,7 @@ absl::StatusOr<StoredRecord> ReadRecord(absl::string_view payload) {
   StoredRecord record;
   record.previous = in.Fixed<int64_t>();
   record.bytes = in.Bytes(in.remaining());
-  if (!in.ok()) return StoreDamaged("a record is too short");
+  if (!in.ok() || record.previous < 0) return StoreDamaged("a record's head is not valid");
   return record;
 }
 
@@ -187,7 +194,9 @@ absl::StatusOr<StoredManifest> ReadManifest(absl::string_view payload) {
   manifest.num_pages = in.Fixed<uint64_t>();
   manifest.pages_hash = in.Fixed<uint64_t>();
   manifest.bytes = in.Bytes(in.remaining());
-  if (!in.ok()) return StoreDamaged("a checkpoint's manifest is too short");
+  if (!in.ok() || manifest.checkpoint == 0 || manifest.checkpoint > kMaxNumber || manifest.revision < 0) {
+    return StoreDamaged("a checkpoint's manifest is not valid");
+  }
   return manifest;
 }
 

@@ -28,7 +28,8 @@ absl::string_view ViewOf(const rocksdb::Slice& slice) { return {slice.data(), sl
 absl::Status StatusOf(const rocksdb::Status& status) {
   if (status.ok()) return absl::OkStatus();
   if (status.IsCorruption()) return StoreDamaged(status.ToString());
-  if (status.IsNoSpace() || status.subcode() == rocksdb::Status::kSpaceLimit) return StoreFull(status.ToString());
+  if (status.IsNoSpace() || status.subcode() == rocksdb::Status::kSpaceLimit)
+    return StoreFull(status.ToString());
   return StoreFailed(status.ToString());
 }
 
@@ -148,8 +149,8 @@ absl::StatusOr<absl::optional<std::string>> RocksDbEngine::LastKey(absl::string_
 
 // RocksDB calls some kinds of damage by other names: where its files are missing or cannot be parsed.
 absl::Status OpenError(const rocksdb::Status& status) {
-  const bool damaged = status.IsInvalidArgument() || status.IsNotFound() || status.IsPathNotFound() ||
-                       status.IsIncomplete();
+  const bool damaged =
+      status.IsInvalidArgument() || status.IsNotFound() || status.IsPathNotFound() || status.IsIncomplete();
   return damaged ? StoreDamaged(status.ToString()) : StatusOf(status);
 }
 
@@ -163,8 +164,8 @@ absl::StatusOr<std::unique_ptr<Engine>> OpenRocksDb(const RocksDbOptions& option
   const rocksdb::Status opened =
       rocksdb::DB::Open(DatabaseOptions(options.env), options.directory + "/rocksdb", &db);
   if (!opened.ok()) return OpenError(opened);
-  auto engine = std::make_unique<RocksDbEngine>(std::move(lock), std::move(mark),
-                                                std::unique_ptr<rocksdb::DB>(db));
+  auto engine =
+      std::make_unique<RocksDbEngine>(std::move(lock), std::move(mark), std::unique_ptr<rocksdb::DB>(db));
   DYNMESH_RETURN_IF_ERROR(engine->CheckWrites());
   return std::unique_ptr<Engine>(std::move(engine));
 }

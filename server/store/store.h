@@ -140,7 +140,7 @@ class Store {
   virtual absl::Status status() const = 0;
 };
 
-inline constexpr size_t kMaxNameBytes = 1024;             ///< of sessions and of values
+inline constexpr size_t kMaxNameBytes = 1024;               ///< of sessions and of values
 inline constexpr size_t kMaxStoredBytes = size_t{1} << 30;  ///< of a record, a page, a value
 
 }  // namespace dynmesh

@@ -12,6 +12,13 @@ absl::Status StoreDamaged(absl::string_view what) {
                    absl::StrCat("the store is damaged: ", what));
 }
 
+absl::Status InSession(const absl::Status& status, absl::string_view session) {
+  const std::string reason = ErrorReason(status);
+  if (reason != reason::kStoreDamaged && reason != reason::kStoreFailed) return status;
+  return MakeError(status.code(), reason, absl::StrCat("session ", session, ": ", status.message()),
+                   {{"session", std::string(session)}});
+}
+
 absl::Status StoreFull(absl::string_view cause) {
   return MakeError(absl::StatusCode::kResourceExhausted, reason::kStoreFull,
                    absl::StrCat("the store's disk is full: ", cause));
@@ -24,18 +31,19 @@ absl::Status StoreFailed(absl::string_view cause) {
 
 absl::Status StoreReadOnly(const absl::Status& first) {
   const bool full = ErrorReason(first) == reason::kStoreFull;
-  return MakeError(
-      full ? first.code() : absl::StatusCode::kFailedPrecondition,
-      full ? reason::kStoreFull : reason::kStoreFailed,
-      absl::StrCat("the store is read-only until it is opened again, since a write failed: ", first.message()),
-      {{"cause", std::string(first.message())}});
+  return MakeError(full ? first.code() : absl::StatusCode::kFailedPrecondition,
+                   full ? reason::kStoreFull : reason::kStoreFailed,
+                   absl::StrCat("the store is read-only until it is opened again, since a write failed: ",
+                                first.message()),
+                   {{"cause", std::string(first.message())}});
 }
 
 absl::Status StoreFormatNewer(uint32_t found, uint32_t supported) {
-  return FailedPrecondition(reason::kStoreFormatNewer,
-                            absl::StrCat("the store is of format ", found, ", and this build knows formats up to ",
-                                         supported, ": use the build that wrote it, or a later one"),
-                            {{"found", absl::StrCat(found)}, {"supported", absl::StrCat(supported)}});
+  return FailedPrecondition(
+      reason::kStoreFormatNewer,
+      absl::StrCat("the store is of format ", found, ", and this build knows formats up to ", supported,
+                   ": use the build that wrote it, or a later one"),
+      {{"found", absl::StrCat(found)}, {"supported", absl::StrCat(supported)}});
 }
 
 absl::Status StoreInUse(absl::string_view directory, absl::string_view pid) {
@@ -46,10 +54,10 @@ absl::Status StoreInUse(absl::string_view directory, absl::string_view pid) {
 }
 
 absl::Status StoreTrimmed(int64_t requested, int64_t oldest) {
-  return MakeError(
-      absl::StatusCode::kOutOfRange, reason::kStoreTrimmed,
-      absl::StrCat("records after revision ", requested, " were asked for, and those up to ", oldest, " are gone"),
-      {{"requested", absl::StrCat(requested)}, {"oldest", absl::StrCat(oldest)}});
+  return MakeError(absl::StatusCode::kOutOfRange, reason::kStoreTrimmed,
+                   absl::StrCat("records after revision ", requested, " were asked for, and those up to ",
+                                oldest, " are gone"),
+                   {{"requested", absl::StrCat(requested)}, {"oldest", absl::StrCat(oldest)}});
 }
 
 absl::Status Fenced(absl::string_view session) {

@@ -24,6 +24,9 @@ inline constexpr char kCheckpointOpen[] = "CHECKPOINT_OPEN";
 /// sentence.
 absl::Status StoreDamaged(absl::string_view what);
 
+/// The same status, of a session: STORE_DAMAGED and STORE_FAILED get metadata session, others stay.
+absl::Status InSession(const absl::Status& status, absl::string_view session);
+
 /// RESOURCE_EXHAUSTED STORE_FULL: the disk, or a quota on it.
 absl::Status StoreFull(absl::string_view cause);
 
