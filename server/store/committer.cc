@@ -1,12 +1,25 @@
 #include "server/store/committer.h"
 
-#include <iterator>
 #include <new>
 #include <utility>
 
 #include "server/store/store_errors.h"
 
 namespace dynmesh {
+namespace {
+
+// Moves the first writes, until they have so many bytes, and says how many they have.
+size_t MoveFirst(std::deque<Committer::Write>& from, size_t min_bytes, std::vector<Committer::Write>& to) {
+  size_t bytes = 0;
+  while (!from.empty() && bytes < min_bytes) {
+    bytes += from.front().batch.bytes();
+    to.push_back(std::move(from.front()));
+    from.pop_front();
+  }
+  return bytes;
+}
+
+}  // namespace
 
 Committer::Committer(Engine* engine, const CommitterOptions& options)
     : engine_(engine), options_(options), thread_([this] { Run(); }) {}
@@ -83,25 +96,17 @@ bool Committer::AwaitWork() {
 Committer::Round Committer::TakeRound() {
   Round round;
   MutexLock lock(&mu_);
-  round.writes.swap(foreground_);
-  TakeBackground(round.writes);
-  bool sync = SyncIsDue() || (stopping_ && background_.empty());
+  MoveFirst(foreground_, options_.round_bytes, round.writes);
+  if (foreground_.empty()) {
+    waiting_bytes_ -= MoveFirst(background_, options_.background_round_bytes, round.writes);
+    room_.NotifyAll();
+  }
+  bool sync = SyncIsDue() || (stopping_ && foreground_.empty() && background_.empty());
   for (const Write& write : round.writes) {
     sync |= write.durability == Durability::kSync && write.refusal.ok();
   }
   if (sync) round.sync = Engine::Sync::kYes;
   return round;
-}
-
-void Committer::TakeBackground(std::vector<Write>& writes) {
-  size_t bytes = 0;
-  auto end = background_.begin();
-  for (; end != background_.end() && bytes < options_.background_round_bytes; ++end)
-    bytes += end->batch.bytes();
-  writes.insert(writes.end(), std::make_move_iterator(background_.begin()), std::make_move_iterator(end));
-  background_.erase(background_.begin(), end);
-  waiting_bytes_ -= bytes;
-  room_.NotifyAll();
 }
 
 absl::Status Committer::Commit(Round& round) {

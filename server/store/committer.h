@@ -24,7 +24,8 @@ struct CommitterOptions {
   /// this time, and within that of one sync.
   absl::Duration async_delay = absl::Milliseconds(50);
   size_t max_waiting_bytes = size_t{8} << 20;  ///< of background writes that wait, before AwaitRoom() blocks
-  size_t background_round_bytes = size_t{1} << 18;  ///< so much goes along with the others at once
+  size_t background_round_bytes = size_t{1} << 18;  ///< so much of them goes along with the others at once
+  size_t round_bytes = size_t{32} << 20;            ///< about so much is written at once
 };
 
 /// The one thread that writes to an engine: whatever waits goes into one batch with at most one sync, so that
@@ -78,7 +79,6 @@ class Committer {
   void Run();
   bool AwaitWork();
   Round TakeRound();
-  void TakeBackground(std::vector<Write>& writes) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
   bool SyncIsDue() const { return sync_at_.has_value() && Clock::now() >= *sync_at_; }
   absl::Status Commit(Round& round);
   void Acknowledge(Round& round);
@@ -90,7 +90,7 @@ class Committer {
   mutable Mutex mu_;
   CondVar news_;  ///< something to write, or the end
   CondVar room_;
-  std::vector<Write> foreground_ ABSL_GUARDED_BY(mu_);
+  std::deque<Write> foreground_ ABSL_GUARDED_BY(mu_);
   std::deque<Write> background_ ABSL_GUARDED_BY(mu_);
   size_t waiting_bytes_ ABSL_GUARDED_BY(mu_) = 0;
   absl::Status status_ ABSL_GUARDED_BY(mu_);

@@ -48,7 +48,9 @@ absl::Status LocalCheckpoint::WritePage(PageKey page, std::string bytes) {
 }
 
 absl::Status LocalCheckpoint::DropPage(PageKey page) {
-  changes_[page] = Change::kDropped;
+  const auto [change, is_new] = changes_.try_emplace(page, Change::kDropped);
+  if (is_new || change->second == Change::kDropped) return absl::OkStatus();
+  change->second = Change::kDropped;
   EngineBatch batch;
   batch.Delete(KeyOf({page, number_}));
   return Enqueue(std::move(batch));

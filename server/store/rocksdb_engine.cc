@@ -19,7 +19,6 @@ namespace {
 // Sorts before all keys of stores, which begin with letters. Its value: the number of writes so far.
 constexpr char kWritesKey[] = "#";
 constexpr size_t kMemtableBytes = size_t{32} << 20;
-constexpr uint64_t kMaxLogBytes = uint64_t{256} << 20;
 constexpr size_t kMaxInfoLogBytes = size_t{1} << 20;
 
 rocksdb::Slice SliceOf(absl::string_view text) { return {text.data(), text.size()}; }
@@ -44,7 +43,6 @@ rocksdb::Options DatabaseOptions(rocksdb::Env* env) {
   options.avoid_flush_during_shutdown = true;
   options.max_bgerror_resume_count = 0;  // after an error only opening again tells what is there
   options.write_buffer_size = kMemtableBytes;
-  options.max_total_wal_size = kMaxLogBytes;
   options.compression = rocksdb::kLZ4Compression;
   options.info_log_level = rocksdb::WARN_LEVEL;
   options.max_log_file_size = kMaxInfoLogBytes;

@@ -161,7 +161,9 @@ TEST(CommitterTest, FailsEveryWriteAfterOneThatFailed) {
   committer.EnqueueBackground(WriteOf(Durability::kAsync, acknowledged.Of(2)));
   for (const auto& [id, status] : acknowledged.Await(3)) {
     EXPECT_EQ(ErrorReason(status), reason::kStoreFailed) << id;
-    if (id > 0) EXPECT_EQ(status.code(), absl::StatusCode::kFailedPrecondition);
+    if (id > 0) {
+      EXPECT_EQ(status.code(), absl::StatusCode::kFailedPrecondition);
+    }
   }
   EXPECT_EQ(committer.AwaitRoom(), committer.status());
   EXPECT_EQ(ErrorReason(committer.status()), reason::kStoreFailed);

@@ -71,7 +71,7 @@ TEST_P(ConformanceTest, ReadingBeginsAfterARevision) {
   SessionStore& session = Create("part");
   for (int64_t revision : {1, 2, 300, 301}) EXPECT_TRUE(AppendNow(session, revision, "x").ok());
   EXPECT_THAT(RecordsAfter(session, 2), ElementsAre(Pair(300, "x"), Pair(301, "x")));
-  EXPECT_THAT(RecordsAfter(session, 150), IsEmpty()) << "the record of 300 says what changed since 2";
+  EXPECT_EQ(RecordsAfter(session, 150), RecordsAfter(session, 2)) << "300 says what changed since 2";
   EXPECT_THAT(RecordsAfter(session, INT64_MAX), IsEmpty());
   EXPECT_EQ(RecordsAfter(session, -5).size(), 4u);
 }
@@ -359,7 +359,7 @@ TEST_P(ConformanceTest, RandomHistoriesAreReadAsTheyWereWritten) {
 
 TEST_P(ConformanceTest, AFlippedBitIsFoundOrHarmless) {
   int found = 0;
-  for (int seed = 0; seed < 150; ++seed) {
+  for (int seed = 0; seed < 60; ++seed) {
     SCOPED_TRACE(absl::StrCat("seed ", seed));
     std::mt19937 random(seed);
     const std::unique_ptr<StoreRig> rig = GetParam().second();
@@ -375,13 +375,13 @@ TEST_P(ConformanceTest, AFlippedBitIsFoundOrHarmless) {
       ++found;
     }
   }
-  EXPECT_GT(found, 20);
+  EXPECT_GT(found, 10);
 }
 
 INSTANTIATE_TEST_SUITE_P(Stores, ConformanceTest,
                          ::testing::Values(std::make_pair("Memory", MakeMemoryRig),
                                            std::make_pair("RocksDb", MakeRocksDbRig)),
-                         [](const auto& info) { return std::string(info.param.first); });
+                         [](const auto& instance) { return std::string(instance.param.first); });
 
 }  // namespace
 }  // namespace dynmesh::testing

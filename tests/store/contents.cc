@@ -69,7 +69,9 @@ void RandomAuthor::Write(int num_steps) {
   ASSERT_EQ(store.status(), absl::OkStatus());
   std::map<std::string, std::unique_ptr<SessionStore>> sessions;
   for (const std::string name : {"left", "right"}) {
-    if (written_.count(name) == 0) EXPECT_EQ((*store)->CreateSession(name), absl::OkStatus());
+    if (written_.count(name) == 0) {
+      EXPECT_EQ((*store)->CreateSession(name), absl::OkStatus());
+    }
     absl::StatusOr<std::unique_ptr<SessionStore>> session = (*store)->OpenSession(name);
     ASSERT_EQ(session.status(), absl::OkStatus());
     sessions[name] = *std::move(session);

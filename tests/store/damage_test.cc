@@ -64,7 +64,9 @@ class DamageTest : public ::testing::Test {
     const absl::Status status = left.ok() ? ReadSession(**left).status() : left.status();
     EXPECT_EQ(status.code(), absl::StatusCode::kDataLoss);
     EXPECT_EQ(ErrorReason(status), reason::kStoreDamaged);
-    if (!status.ok()) EXPECT_EQ(GetErrorDetail(status)->Find("session"), "left");
+    if (!status.ok()) {
+      EXPECT_EQ(GetErrorDetail(status)->Find("session"), "left");
+    }
     EXPECT_EQ(ContentsOf(**(*store)->OpenSession("right")),
               (SessionContents{2, "m", {{1, "right"}, {2, "right"}}, {{3, "right3"}, {4, "right4"}}}));
     EXPECT_EQ((*store)->DeleteSession("left"), absl::OkStatus()) << "a damaged session can be deleted";

@@ -33,10 +33,12 @@ TEST(LayoutTest, TheExampleOfTheDocumentIsWhatIsWritten) {
 }
 
 TEST(LayoutTest, WhatIsWrittenIsReadAgain) {
-  const auto record = ReadRecord(WriteRecord({41, "bytes"}));
+  const std::string record_payload = WriteRecord({41, "bytes"});
+  const auto record = ReadRecord(record_payload);
   EXPECT_EQ(record->previous, 41);
   EXPECT_EQ(record->bytes, "bytes");
-  const auto manifest = ReadManifest(WriteManifest({7, 8, 9, 10, "mine"}));
+  const std::string manifest_payload = WriteManifest({7, 8, 9, 10, "mine"});
+  const auto manifest = ReadManifest(manifest_payload);
   EXPECT_EQ(manifest->checkpoint, 7u);
   EXPECT_EQ(manifest->revision, 8);
   EXPECT_EQ(manifest->num_pages, 9u);
