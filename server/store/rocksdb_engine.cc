@@ -72,12 +72,18 @@ class RocksDbEngine final : public Engine {
   uint64_t num_writes_ = 0;
 };
 
+absl::StatusOr<uint64_t> ReadWrites(absl::string_view value) {
+  ByteReader in(value);
+  const uint64_t writes = in.Fixed<uint64_t>();
+  if (!in.done()) return StoreDamaged("the number of writes has another size");
+  return writes;
+}
+
 absl::Status RocksDbEngine::CheckWrites() {
-  DYNMESH_ASSIGN_OR_RETURN(const absl::optional<std::string> value, Get(kWritesKey));
-  if (value.has_value()) {
-    ByteReader in(*value);
-    num_writes_ = in.Fixed<uint64_t>();
-    if (!in.done()) return StoreDamaged("the number of writes has another size");
+  const absl::StatusOr<absl::optional<std::string>> value = Get(kWritesKey);
+  DYNMESH_RETURN_IF_ERROR(value.status());
+  if (value->has_value()) {
+    DYNMESH_ASSIGN_OR_RETURN(num_writes_, ReadWrites(**value));
   }
   if (num_writes_ >= mark_->number()) return absl::OkStatus();
   return StoreDamaged(absl::StrCat("the log ends with write ", num_writes_, ", but ", mark_->number(),
