@@ -1,5 +1,6 @@
 #include "server/store/committer.h"
 
+#include <algorithm>
 #include <new>
 #include <utility>
 
@@ -53,7 +54,7 @@ absl::Status Committer::AwaitRoom() {
 }
 
 void Committer::Drain() {
-  AwaitedWrite foreground({}, Durability::kAsync);
+  AwaitedWrite foreground({}, Durability::kSync);
   AwaitedWrite background({}, Durability::kAsync);
   EnqueueBackground(std::move(background.write));
   Enqueue(std::move(foreground.write));
@@ -105,8 +106,14 @@ Committer::Round Committer::TakeRound() {
   for (const Write& write : round.writes) {
     sync |= write.durability == Durability::kSync && write.refusal.ok();
   }
-  if (sync) round.sync = Engine::Sync::kYes;
+  if (sync && IsDirtyAfter(round)) round.sync = Engine::Sync::kYes;
   return round;
+}
+
+// Whether something is not on disk once the round has been written.
+bool Committer::IsDirtyAfter(const Round& round) const {
+  const auto writes = [](const Write& write) { return write.refusal.ok() && !write.batch.changes().empty(); };
+  return sync_at_.has_value() || std::any_of(round.writes.begin(), round.writes.end(), writes);
 }
 
 absl::Status Committer::Commit(Round& round) {

@@ -63,7 +63,8 @@ class Committer {
   /// Blocks while too much waits. Errors: those of status().
   absl::Status AwaitRoom();
 
-  /// Returns when all that was enqueued before is written, or has failed. Not from a Done.
+  /// Returns when all that was enqueued before is written, and of the foreground on disk, or has failed. Not
+  /// from a Done.
   void Drain();
 
   /// OK, or what writes get since one has failed.
@@ -79,6 +80,7 @@ class Committer {
   void Run();
   bool AwaitWork();
   Round TakeRound();
+  bool IsDirtyAfter(const Round& round) const;
   bool SyncIsDue() const { return sync_at_.has_value() && Clock::now() >= *sync_at_; }
   absl::Status Commit(Round& round);
   void Acknowledge(Round& round);

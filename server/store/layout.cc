@@ -24,7 +24,6 @@ constexpr char kValueTag = 'v';
 constexpr size_t kSealBytes = sizeof(uint64_t);
 constexpr size_t kTagAt = 1 + sizeof(uint64_t);
 constexpr size_t kSuffixAt = kTagAt + 1;
-constexpr uint64_t kMaxNumber = INT64_MAX;  // of everything that counts, so that one more never overflows
 
 std::string Tag(char tag) { return std::string(1, tag); }
 std::string AfterTag(char tag) { return Tag(static_cast<char>(tag + 1)); }

@@ -12,7 +12,9 @@
 /// Keys and values of a store in an Engine. FORMAT.md says what they are, byte by byte.
 namespace dynmesh::layout {
 
-inline constexpr uint32_t kFormat = 1;
+inline constexpr uint64_t kFormat = 1;
+
+inline constexpr uint64_t kMaxNumber = INT64_MAX;  ///< of all that counts, so that one more never overflows
 
 using SessionId = uint64_t;  ///< never used again, so that nothing of a deleted session can come back
 

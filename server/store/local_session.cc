@@ -61,7 +61,7 @@ absl::StatusOr<std::unique_ptr<SessionStore>> LocalSession::Open(OwnedSession ow
 absl::Status LocalSession::Load() {
   DYNMESH_RETURN_IF_ERROR(LoadCheckpoint());
   DYNMESH_RETURN_IF_ERROR(LoadRecords());
-  progress_->durable = progress_->last.load();  // whoever opened the engine found it on disk, or synced it
+  progress_->durable = progress_->last.load();  // the store has synced what former owners wrote
   return absl::OkStatus();
 }
 
@@ -127,8 +127,9 @@ absl::Status LocalSession::ReadRecords(int64_t after, RecordFn fn) {
 
 absl::StatusOr<absl::optional<Checkpoint>> LocalSession::ReadCheckpoint(PageFn fn) {
   absl::optional<Checkpoint> checkpoint;
-  const absl::StatusOr<PageTable> pages = PageTable::Read(owned_.engine(), owned_.id(), checkpoint, fn);
+  absl::StatusOr<PageTable> pages = PageTable::Read(owned_.engine(), owned_.id(), checkpoint, fn);
   DYNMESH_RETURN_IF_ERROR(Named(pages.status()));
+  KeepPages(*std::move(pages));
   return checkpoint;
 }
 
@@ -147,13 +148,19 @@ absl::StatusOr<std::unique_ptr<CheckpointWriter>> LocalSession::BeginCheckpoint(
 }
 
 absl::Status LocalSession::LoadPages() {
-  if (pages_.has_value()) return absl::OkStatus();
-  absl::optional<Checkpoint> checkpoint;
-  absl::StatusOr<PageTable> pages = PageTable::Read(
-      owned_.engine(), owned_.id(), checkpoint, [](PageKey, absl::string_view) { return absl::OkStatus(); });
-  DYNMESH_RETURN_IF_ERROR(Named(pages.status()));
-  pages_ = *std::move(pages);
-  return absl::OkStatus();
+  if (HasPages()) return absl::OkStatus();
+  return ReadCheckpoint([](PageKey, absl::string_view) { return absl::OkStatus(); }).status();
+}
+
+// If none are there: what is there knows of all checkpoints of this owner, and `pages` may not.
+void LocalSession::KeepPages(PageTable pages) {
+  MutexLock lock(&mu_);
+  if (!pages_.has_value()) pages_ = std::move(pages);
+}
+
+bool LocalSession::HasPages() {
+  MutexLock lock(&mu_);
+  return pages_.has_value();
 }
 
 absl::Status LocalSession::TrimRecords(int64_t revision) {

@@ -55,13 +55,17 @@ class LocalSession final : public SessionStore {
   absl::Status LoadRecords();
   absl::Status CheckAppend(const Record& record) const;
   absl::Status LoadPages();
+  void KeepPages(PageTable pages);
+  bool HasPages();
   absl::Status Named(const absl::Status& status) const;
 
   const OwnedSession owned_;
   // Shared with callbacks that run after this is gone.
   const std::shared_ptr<SessionProgress> progress_ = std::make_shared<SessionProgress>();
   std::atomic<bool> checkpoint_open_{false};
-  absl::optional<PageTable> pages_;  ///< from the first checkpoint on; of whoever has checkpoint_open_
+  Mutex mu_;
+  /// From the first reading of all pages on. It is set once, under mu_; then it is the open checkpoint's own.
+  absl::optional<PageTable> pages_;
 };
 
 }  // namespace dynmesh

@@ -94,6 +94,7 @@ absl::Status LocalStore::CreateSession(absl::string_view name) {
   {
     MutexLock lock(&mu_);
     if (catalogue_.contains(name)) return StoredSessionExists(name);
+    if (last_id_ >= layout::kMaxNumber) return StoreDamaged("no number is left for a session");
     const layout::SessionId id = ++last_id_;
     catalogue_[std::string(name)] = {std::make_shared<Ownership>(id, std::string(name)), {}};
     const std::string key = layout::NameKey(name);

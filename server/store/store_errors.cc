@@ -38,7 +38,7 @@ absl::Status StoreReadOnly(const absl::Status& first) {
                    {{"cause", std::string(first.message())}});
 }
 
-absl::Status StoreFormatNewer(uint32_t found, uint32_t supported) {
+absl::Status StoreFormatNewer(uint64_t found, uint64_t supported) {
   return FailedPrecondition(
       reason::kStoreFormatNewer,
       absl::StrCat("the store is of format ", found, ", and this build knows formats up to ", supported,

@@ -38,7 +38,7 @@ absl::Status StoreFailed(absl::string_view cause);
 absl::Status StoreReadOnly(const absl::Status& first);
 
 /// FAILED_PRECONDITION STORE_FORMAT_NEWER, metadata found and supported.
-absl::Status StoreFormatNewer(uint32_t found, uint32_t supported);
+absl::Status StoreFormatNewer(uint64_t found, uint64_t supported);
 
 /// FAILED_PRECONDITION STORE_IN_USE, metadata pid: "" when the other process has not said it.
 absl::Status StoreInUse(absl::string_view directory, absl::string_view pid);

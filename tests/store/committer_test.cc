@@ -230,6 +230,10 @@ TEST(CommitterTest, DrainsBothLanes) {
   }
   committer.Drain();
   EXPECT_EQ(acknowledged.Await(0).size(), 20u);
+  committer.Drain();
+  const size_t num_writes = engine.notes().size();
+  committer.Drain();
+  EXPECT_EQ(engine.notes().size(), num_writes) << "nothing new, nothing to sync";
 }
 
 TEST(CommitterTest, WritesAndSyncsWhatWaitsBeforeItEnds) {

@@ -143,6 +143,18 @@ TEST_P(ConformanceTest, ANewOwnerFencesTheFormer) {
   EXPECT_THAT(ContentsOf(owner).pages, ElementsAre(Pair(2, "mine")));
 }
 
+TEST_P(ConformanceTest, ANewOwnerFindsOnDiskWhatTheFormerAppended) {
+  EXPECT_TRUE(AppendNow(Create("part"), 1, "x", Durability::kAsync).ok());
+  EXPECT_EQ(session_->durable_revision(), 0);
+  EXPECT_EQ(OpenNamed("part").durable_revision(), 1);
+  rig_->faults().Set(Fault::kFailedSync);  // of the store's end
+  session_.reset();
+  store_.reset();
+  rig_->LosePower();
+  rig_->faults().Set(Fault::kNone);
+  EXPECT_THAT(RecordsAfter(ReopenNamed("part"), 0), ElementsAre(Pair(1, "x")));
+}
+
 TEST_P(ConformanceTest, ACheckpointKeepsThePagesThatItDoesNotMention) {
   SessionStore& session = Create("part");
   Commit(session, 3, {{1, "a"}, {2, "b"}, {UINT64_MAX, "c"}});
