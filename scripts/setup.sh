@@ -7,7 +7,7 @@ set -euo pipefail
 server_packages=(
   g++ cmake ninja-build ccache pkg-config
   libgrpc++-dev libprotobuf-dev protobuf-compiler protobuf-compiler-grpc
-  libabsl-dev libboost-dev libspdlog-dev libdraco-dev libzstd-dev libxxhash-dev
+  libabsl-dev libboost-dev libspdlog-dev libdraco-dev libzstd-dev libxxhash-dev librocksdb-dev
 )
 build_packages=(
   "${server_packages[@]}"

@@ -62,6 +62,14 @@ class CondVar {
     return result == std::cv_status::no_timeout;
   }
 
+  /// The same for a span of time, which stays as long as it is when the wall clock is set.
+  bool WaitFor(Mutex* mu, absl::Duration timeout) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu) {
+    std::unique_lock<std::mutex> lock(mu->mu_, std::adopt_lock);
+    const auto result = changed_.wait_for(lock, absl::ToChronoNanoseconds(timeout));
+    lock.release();
+    return result == std::cv_status::no_timeout;
+  }
+
   void NotifyOne() { changed_.notify_one(); }
   void NotifyAll() { changed_.notify_all(); }
 

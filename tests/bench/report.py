@@ -3,14 +3,14 @@ import dataclasses
 import json
 
 NANOSECONDS = {"ns": 1.0, "us": 1e3, "ms": 1e6, "s": 1e9}
-TYPES = {"tetrahedron": "tetrahedra", "hexahedron": "hexahedra", "triangle": "triangles"}
+TYPES = {"tetrahedron": "tetrahedra", "hexahedron": "hexahedra", "triangle": "triangles", "none": "no mesh"}
 
 
 @dataclasses.dataclass
 class Run:
     """One program on one mesh in one order."""
 
-    family: str  # core, memory, service or scale
+    family: str  # core, memory, service, scale or store
     mesh: str
     order: str
     context: dict
@@ -45,7 +45,7 @@ class Run:
 
 
 def _plain_name(entry):
-    return "/".join(part for part in entry["run_name"].split("/") if not part.startswith("iterations:"))
+    return "/".join(part for part in entry["run_name"].split("/") if not part.startswith("iterations:") and part != "real_time")
 
 
 def _place(name):
@@ -160,6 +160,12 @@ def _service(run):
     return markdown(["operator and size of a batch, adaptation", "rate or time", "smallest angle"], rows)
 
 
+def _store(run):
+    rows = [[name.removeprefix("store/"), f"{run.rate(name):.0f}/s", ratio_text(run.rate(name) / run.rate(limit))]
+            for name in run.benchmarks for limit in [name.split("/")[0] + "/" + name.split("/")[1] + "/limit"]]
+    return markdown(["appends of 2 KiB, one waited for after another or 256 at once", "rate", "x bare RocksDB"], rows)
+
+
 def _against_limit(run, prefix):
     rows = []
     for task in _tasks(run, prefix):
@@ -203,6 +209,9 @@ def details(runs):
     for run in runs:
         if run.family == "service":
             parts += [f"## {run.mesh} through the daemon: {run.elements} {TYPES[run.type]}", "", _service(run), ""]
+    for run in runs:
+        if run.family == "store":
+            parts += ["## Store, wall time", "", _store(run), ""]
     scale = sorted((run for run in runs if run.family == "scale"), key=lambda run: run.elements)
     return "\n".join(parts + ["## Scale", "", _scale(scale)])
 

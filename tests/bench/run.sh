@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Builds and runs the benchmarks of core/ and of the daemon, prints ratios with their targets, writes RESULTS.md and
+# Builds and runs the benchmarks of core/, of the store and of the daemon, prints ratios with their targets, writes RESULTS.md and
 # build/bench/core.json. Wants a quiet machine and some twenty minutes.
 #
 # usage: tests/bench/run.sh
@@ -29,7 +29,7 @@ flags=(
 
 cmake --preset release -B $build -DDYNMESH_BENCH=ON -DDYNMESH_TESTS=OFF -DDYNMESH_SERVER=ON -DDYNMESH_PYTHON=ON \
   >/dev/null
-cmake --build $build --target core_bench memory_bench scale_bench dynmeshd dynmesh_python
+cmake --build $build --target core_bench memory_bench scale_bench store_bench dynmeshd dynmesh_python
 rm -rf $reports $arrays
 mkdir -p $reports $arrays
 
@@ -71,5 +71,7 @@ done
 for size in ${SCALE:-100000 800000}; do
   run "scale.$size.hilbert" scale_bench "$size"
 done
+
+run store.disk.none store_bench $reports
 
 /usr/bin/python3 tests/bench/table.py $reports $build/core.json "${RESULTS:-tests/bench/RESULTS.md}"

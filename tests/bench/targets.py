@@ -112,6 +112,14 @@ def _scale(table, runs):
                       costs[-1] / costs[0], 1.5)
 
 
+def _store(table, run):
+    one = run.rate("store/sync/one_editor")
+    table.at_least("synced appends of one editor: rate / bare RocksDB", one / run.rate("store/sync/limit"), 0.8,
+                   report.ratio_text)
+    table.at_least("synced appends: rate of 64 editors / of one", run.rate("store/sync/editors/64") / one, 15.0,
+                   report.ratio_text)
+
+
 def table(runs):
     """Of the tetrahedra, for which the targets were set; as Markdown."""
     result = Table()
@@ -130,6 +138,9 @@ def table(runs):
         if run.family == "service":
             _service(result, run, next((c for c in runs if (c.family, c.mesh, c.order) == ("core", run.mesh, run.order)),
                                        None))
+    for run in runs:
+        if run.family == "store":
+            _store(result, run)
     _scale(result, [run for run in of_tets if run.family == "scale"])
     mesh = core[0].mesh if core else "tetrahedra"
     return report.markdown([f"{mesh}", "wanted", "measured", ""], result.rows)

@@ -18,23 +18,10 @@
 #include "server/session/mutex.h"
 #include "server/session/registry.h"
 #include "server/session/session.h"
+#include "tests/support/await.h"
 
 /// What the tests of the session layer share.
 namespace dynmesh::testing {
-
-/// How long a test waits for something that must happen.
-inline constexpr absl::Duration kPatience = absl::Seconds(60);
-
-/// Waits until pred() holds; false when that takes too long. REQUIRES: whoever makes it true notifies
-/// `changed`.
-template <typename Pred>
-bool AwaitThat(Mutex* mu, CondVar& changed, Pred pred) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu) {
-  const absl::Time deadline = absl::Now() + kPatience;
-  while (!pred()) {
-    if (!changed.WaitUntil(mu, deadline)) return pred();
-  }
-  return true;
-}
 
 /// Threads, and sessions on them. Sessions may be used after Stop(), but nothing follows any more.
 class Daemon {

@@ -1,0 +1,73 @@
+#ifndef DYNMESH_SERVER_STORE_LOCAL_SESSION_H_
+#define DYNMESH_SERVER_STORE_LOCAL_SESSION_H_
+
+#include <algorithm>
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "absl/base/thread_annotations.h"
+#include "server/session/mutex.h"
+#include "server/store/ownership.h"
+#include "server/store/page_table.h"
+#include "server/store/store.h"
+
+namespace dynmesh {
+
+/// How far a session has come.
+struct SessionProgress {
+  /// On the committer's thread.
+  void SetDurable(int64_t revision) { durable = std::max(durable.load(), revision); }
+
+  std::atomic<int64_t> last{0};        ///< record or checkpoint
+  std::atomic<int64_t> durable{0};     ///< the same, on disk
+  std::atomic<int64_t> checkpoint{0};  ///< revision of the last one
+  std::atomic<int64_t> trimmed{0};     ///< records up to here are gone
+};
+
+/// A session of a LocalStore.
+class LocalSession final : public SessionStore {
+ public:
+  /// Finds where the session stands; reads neither records nor pages. Errors: as those of SessionStore.
+  static absl::StatusOr<std::unique_ptr<SessionStore>> Open(OwnedSession owned);
+
+  uint64_t fencing_token() const override { return owned_.token(); }
+  int64_t last_revision() const override { return progress_->last; }
+  int64_t durable_revision() const override { return progress_->durable; }
+
+  void Append(Record record, Durability durability, Done done) override;
+  absl::Status ReadRecords(int64_t after, RecordFn fn) override;
+  absl::StatusOr<absl::optional<Checkpoint>> ReadCheckpoint(PageFn fn) override;
+  absl::StatusOr<std::unique_ptr<CheckpointWriter>> BeginCheckpoint(int64_t revision) override;
+  absl::Status TrimRecords(int64_t revision) override;
+  absl::Status PutValue(absl::string_view name, std::string bytes) override;
+  absl::Status DeleteValue(absl::string_view name) override;
+  absl::StatusOr<absl::optional<std::string>> GetValue(absl::string_view name) override;
+
+ private:
+  friend class LocalCheckpoint;
+
+  explicit LocalSession(OwnedSession owned) : owned_(std::move(owned)) {}
+  absl::Status Load();
+  absl::Status LoadCheckpoint();
+  absl::Status LoadRecords();
+  absl::Status CheckAppend(const Record& record) const;
+  absl::Status LoadPages();
+  void KeepPages(PageTable pages);
+  bool HasPages();
+  absl::Status Named(const absl::Status& status) const;
+
+  const OwnedSession owned_;
+  // Shared with callbacks that run after this is gone.
+  const std::shared_ptr<SessionProgress> progress_ = std::make_shared<SessionProgress>();
+  std::atomic<bool> checkpoint_open_{false};
+  Mutex mu_;
+  /// From the first reading of all pages on. It is set once, under mu_; then it is the open checkpoint's own.
+  absl::optional<PageTable> pages_;
+};
+
+}  // namespace dynmesh
+
+#endif  // DYNMESH_SERVER_STORE_LOCAL_SESSION_H_

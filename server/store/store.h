@@ -1,0 +1,148 @@
+#ifndef DYNMESH_SERVER_STORE_STORE_H_
+#define DYNMESH_SERVER_STORE_STORE_H_
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absl/functional/any_invocable.h"
+#include "absl/functional/function_ref.h"
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+#include "absl/types/optional.h"
+
+/// Where sessions outlive the daemon. A store keeps bytes: what they mean is the session's business.
+namespace dynmesh {
+
+/// When an append is acknowledged. Sessions that need neither have no store.
+enum class Durability {
+  kAsync,  ///< once written: survives the process; loss of power takes what the last moments brought
+  kSync,   ///< once it is on disk
+};
+
+/// What a session is after the record or the checkpoint before it, up to `revision`.
+struct Record {
+  int64_t revision = 0;  ///< greater than that of what came before; more than one more is allowed
+  std::string bytes;
+};
+
+/// The head of a checkpoint.
+struct Checkpoint {
+  int64_t revision = 0;
+  std::string manifest;  ///< the session's own: how to read the pages
+};
+
+using PageKey = uint64_t;
+
+/// A checkpoint being made. Destroyed without Commit(), it leaves nothing behind, and neither does a crash.
+///
+/// Pages go to the disk in the background of appends. Those that are neither written nor dropped stay as they
+/// are in the checkpoint before.
+/// Thread safety: one thread at a time.
+class CheckpointWriter {
+ public:
+  virtual ~CheckpointWriter() = default;
+
+  /// Blocks while too much waits to be written. Writing a page again replaces it.
+  virtual absl::Status WritePage(PageKey page, std::string bytes) = 0;
+  /// The page is no part of the checkpoint. Dropping one that is not there does nothing.
+  virtual absl::Status DropPage(PageKey page) = 0;
+  /// Makes it the session's checkpoint, all or nothing, and returns once it is on disk. The writer cannot be
+  /// used after it.
+  virtual absl::Status Commit(std::string manifest) = 0;
+};
+
+/// One session's records, checkpoint and named values, for as long as no other owner opens it.
+///
+///     session->Append({43, bytes}, Durability::kSync, [](const absl::Status& status) { ... });
+///     auto writer = session->BeginCheckpoint(43);          // *writer: ->WritePage(...), ->Commit(...)
+///     session->TrimRecords(43);
+///
+/// Recovery: ReadCheckpoint(), then ReadRecords() after its revision.
+///
+/// Everything that writes Errors: ABORTED FENCED when another owner has opened the session since; NOT_FOUND
+/// SESSION_DELETED; UNAVAILABLE or FAILED_PRECONDITION STORE_FAILED and RESOURCE_EXHAUSTED STORE_FULL: that
+/// write failed or one before it, and the store only reads until it is opened again. Everything that reads
+/// Errors: DATA_LOSS STORE_DAMAGED, naming the session; UNAVAILABLE STORE_FAILED.
+/// Thread safety: full, except that Append() and BeginCheckpoint() are called by one thread at a time. Must
+/// not outlive its store.
+class SessionStore {
+ public:
+  /// Called exactly once, on a thread of the store, never from within the call that was given it. Must be
+  /// short and must not wait for the store.
+  using Done = absl::AnyInvocable<void(const absl::Status&)>;
+  using RecordFn = absl::FunctionRef<absl::Status(int64_t revision, absl::string_view bytes)>;
+  using PageFn = absl::FunctionRef<absl::Status(PageKey page, absl::string_view bytes)>;
+
+  virtual ~SessionStore() = default;
+
+  /// Greater than the token of every owner before.
+  virtual uint64_t fencing_token() const = 0;
+  /// The revision of the last record or checkpoint, acknowledged or not; 0 when there is none.
+  virtual int64_t last_revision() const = 0;
+  /// The last one that is known to survive a loss of power.
+  virtual int64_t durable_revision() const = 0;
+
+  /// Acknowledgements come in the order of the calls. A record that was not acknowledged may be found after a
+  /// crash all the same, but only whole and only with all before it.
+  /// Errors: INVALID_ARGUMENT BAD_ARGUMENT (the revision is not a later one); RESOURCE_EXHAUSTED
+  /// LIMIT_EXCEEDED (kMaxStoredBytes).
+  virtual void Append(Record record, Durability durability, Done done) = 0;
+
+  /// Records with greater revisions than `after`, in order; fn's first error ends it and is returned.
+  /// fn must not write to the store. Errors: OUT_OF_RANGE STORE_TRIMMED: the first ones are gone.
+  virtual absl::Status ReadRecords(int64_t after, RecordFn fn) = 0;
+
+  /// The checkpoint that was committed last, with its pages in ascending order; nullopt when there is none.
+  /// Pages are handed out before the last one is known to be good: drop them on an error.
+  virtual absl::StatusOr<absl::optional<Checkpoint>> ReadCheckpoint(PageFn fn) = 0;
+
+  /// One at a time. `revision` is that of the state which the records after it will be added to: pages may
+  /// hold later changes, if records tell them again. A checkpoint beyond the last record replaces all
+  /// records. Errors: FAILED_PRECONDITION CHECKPOINT_OPEN; INVALID_ARGUMENT BAD_ARGUMENT (a revision before
+  /// the last checkpoint's).
+  virtual absl::StatusOr<std::unique_ptr<CheckpointWriter>> BeginCheckpoint(int64_t revision) = 0;
+
+  /// Deletes records up to and including `revision`, soon.
+  /// Errors: INVALID_ARGUMENT BAD_ARGUMENT: no checkpoint holds what they say.
+  virtual absl::Status TrimRecords(int64_t revision) = 0;
+
+  /// Small values by name, on disk when the call returns. Not from a Done.
+  virtual absl::Status PutValue(absl::string_view name, std::string bytes) = 0;
+  virtual absl::Status DeleteValue(absl::string_view name) = 0;
+  virtual absl::StatusOr<absl::optional<std::string>> GetValue(absl::string_view name) = 0;
+};
+
+/// The sessions that are kept, by name. Opening a store reads their names only.
+///
+/// Errors of what writes: as SessionStore's.
+/// Thread safety: full.
+class Store {
+ public:
+  virtual ~Store() = default;
+
+  /// Sorted by name, damaged ones among them.
+  virtual std::vector<std::string> ListSessions() const = 0;
+
+  /// Errors: ALREADY_EXISTS SESSION_EXISTS; INVALID_ARGUMENT BAD_SESSION_NAME (empty, or over kMaxNameBytes).
+  virtual absl::Status CreateSession(absl::string_view name) = 0;
+
+  /// Takes the session over from whoever has it. What the former owner appended before is there.
+  /// Errors: NOT_FOUND SESSION_NOT_FOUND; DATA_LOSS STORE_DAMAGED.
+  virtual absl::StatusOr<std::unique_ptr<SessionStore>> OpenSession(absl::string_view name) = 0;
+
+  /// With all its data, whoever has it open. Errors: NOT_FOUND SESSION_NOT_FOUND.
+  virtual absl::Status DeleteSession(absl::string_view name) = 0;
+
+  /// OK, or why the store only reads until it is opened again.
+  virtual absl::Status status() const = 0;
+};
+
+inline constexpr size_t kMaxNameBytes = 1024;               ///< of sessions and of values
+inline constexpr size_t kMaxStoredBytes = size_t{1} << 30;  ///< of a record, a page, a value
+
+}  // namespace dynmesh
+
+#endif  // DYNMESH_SERVER_STORE_STORE_H_

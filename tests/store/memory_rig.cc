@@ -1,0 +1,99 @@
+#include <iterator>
+#include <utility>
+#include <vector>
+
+#include "server/store/local_store.h"
+#include "server/store/memory_engine.h"
+#include "server/store/store_errors.h"
+#include "tests/store/store_rig.h"
+
+namespace dynmesh::testing {
+namespace {
+
+constexpr char kFirstKey[] = "";
+constexpr char kAfterLastKey[] = "\xff";
+
+/// What a process sees of a medium, and what of that has been synced.
+struct Medium {
+  std::unique_ptr<MemoryEngine> seen = std::make_unique<MemoryEngine>();
+  MemoryEngine synced;
+  std::vector<EngineBatch> not_synced;
+};
+
+/// An engine on a Medium that outlives it.
+class FaultyEngine final : public Engine {
+ public:
+  FaultyEngine(Medium* medium, FaultSwitch* faults) : medium_(medium), faults_(faults) {}
+
+  absl::Status Write(const EngineBatch& batch, Sync sync) override {
+    const Fault fault = faults_->fault();
+    if (fault == Fault::kFullDisk) return StoreFull("injected");
+    if (fault == Fault::kFailedWrite || fault == Fault::kTornWrite) return StoreFailed("injected");
+    medium_->not_synced.push_back(batch);
+    (void)medium_->seen->Write(batch, Sync::kNo);
+    return sync == Sync::kYes ? SyncAll() : absl::OkStatus();
+  }
+
+  absl::StatusOr<absl::optional<std::string>> Get(absl::string_view key) const override {
+    return medium_->seen->Get(key);
+  }
+  absl::Status Scan(absl::string_view from, absl::string_view to, Visitor visit) const override {
+    return medium_->seen->Scan(from, to, visit);
+  }
+  absl::StatusOr<absl::optional<std::string>> LastKey(absl::string_view from,
+                                                      absl::string_view to) const override {
+    return medium_->seen->LastKey(from, to);
+  }
+
+ private:
+  absl::Status SyncAll() {
+    faults_->OnSync();
+    if (faults_->fault() == Fault::kFailedSync) return StoreFailed("injected");
+    for (const EngineBatch& batch : medium_->not_synced) (void)medium_->synced.Write(batch, Sync::kNo);
+    medium_->not_synced.clear();
+    return absl::OkStatus();
+  }
+
+  Medium* const medium_;
+  FaultSwitch* const faults_;
+};
+
+class MemoryRig final : public StoreRig {
+ public:
+  absl::StatusOr<std::unique_ptr<Store>> Open(const CommitterOptions& options) override {
+    return LocalStore::Open(std::make_unique<FaultyEngine>(&medium_, &faults()), options);
+  }
+
+  void LosePower() override {
+    medium_.seen = std::make_unique<MemoryEngine>();
+    medium_.not_synced.clear();
+    EngineBatch all;
+    (void)medium_.synced.Scan(kFirstKey, kAfterLastKey, [&](absl::string_view key, absl::string_view value) {
+      all.Put(std::string(key), std::string(value));
+      return absl::OkStatus();
+    });
+    (void)medium_.seen->Write(all, Engine::Sync::kNo);
+  }
+
+  void FlipBit(std::mt19937& random) override {
+    std::vector<std::pair<std::string, std::string>> all;
+    (void)medium_.seen->Scan(kFirstKey, kAfterLastKey, [&](absl::string_view key, absl::string_view value) {
+      all.emplace_back(key, value);
+      return absl::OkStatus();
+    });
+    auto& [key, value] = all[random() % all.size()];
+    value[random() % value.size()] ^= 1 << random() % 8;
+    EngineBatch flipped;
+    flipped.Put(std::move(key), std::move(value));
+    (void)medium_.seen->Write(flipped, Engine::Sync::kNo);
+  }
+
+ private:
+  Medium medium_;
+};
+
+}  // namespace
+
+std::unique_ptr<StoreRig> MakeMemoryRig() { return std::make_unique<MemoryRig>(); }
+
+}  // namespace dynmesh::testing
