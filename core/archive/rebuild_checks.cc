@@ -127,10 +127,14 @@ absl::Status Rebuilder::IndexDuplicates(EntityKind kind) {
 }
 
 absl::Status Rebuilder::CheckFit() const {
-  if (mesh_.FitNow() == fit_) return absl::OkStatus();
+  const BatchImage::Fit actual = mesh_.FitNow();
+  if (actual == fit_) return absl::OkStatus();
   return ArchiveDamaged(
       absl::StrCat("the mesh at revision ", revision(), " is not the one whose checksum the archive tells"),
-      {{"revision", absl::StrCat(revision())}});
+      {{"revision", absl::StrCat(revision())},
+       {"topology", absl::StrCat(actual.checksum.topology)},
+       {"geometry", absl::StrCat(actual.checksum.geometry)},
+       {"counts", JoinSlots(actual.num_live)}});
 }
 
 }  // namespace dynmesh

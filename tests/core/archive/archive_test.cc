@@ -60,7 +60,7 @@ TEST(ArchiveTest, PagesMayComeInAnyOrder) {
 
 TEST(ArchiveTest, ABulkBuiltMeshComesBack) {
   const Mesh grid = HexGrid(3, 2, 4);
-  BulkBuilder builder({.order = SlotOrder::kHilbert});
+  BulkBuilder builder({.mesh = {}, .order = SlotOrder::kHilbert});
   std::vector<Point> points;
   for (Slot v = 0; v < grid.slots(EntityKind::kVertex).limit(); ++v) {
     points.push_back(grid.Position(VertexId(v)));
