@@ -165,6 +165,9 @@ class Mesh {
   FixedRows FixedRowsOf(Relation relation) const;
   /// Vertices(f) and Edges(f) of faces stand so many entries apart.
   size_t FaceStride() const { return face_stride_; }
+  /// The same of Vertices(c) and Faces(c) of cells.
+  size_t CellVertexStride() const { return cell_vertex_stride_; }
+  size_t CellFaceStride() const { return cell_face_stride_; }
   /// Whether no cell of another type was ever there.
   bool IsTetrahedral() const { return cell_vertex_stride_ == NumVertices(ElementType::kTetrahedron); }
 
@@ -286,6 +289,7 @@ class Mesh {
   friend class BatchRestorer;
   friend class BulkBuilder;
   friend class MeshValidator;
+  friend class Rebuilder;
   friend class RowKernels;
   friend class MeshTestPeer;
 

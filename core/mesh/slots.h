@@ -99,6 +99,25 @@ class Slots {
     quarantine_.clear();
   }
 
+  /// For who rebuilds a mesh from what was kept of it: someone born then lives at a slot, or did. FreeDead()
+  /// must follow the last of these.
+  void PutLive(Slot slot, Stamp born) {
+    live_.Set(slot);
+    PutBirth(slot, born);
+  }
+  void PutDead(Slot slot, Stamp born) {
+    live_.Clear(slot);
+    PutBirth(slot, born);
+  }
+
+  /// Makes all slots free in which nobody lives. REQUIRES: all below the limit were put.
+  void FreeDead() {
+    for (Slot slot = 0; slot < limit_; ++slot) {
+      if (!live_.Test(slot)) free_.Set(slot);
+    }
+    first_free_hint_ = 0;
+  }
+
   /// Whether the slot had an occupant and may have another one now.
   bool IsFree(Slot slot) const { return free_.Test(slot); }
   bool IsLive(Slot slot) const { return live_.Test(slot); }
@@ -124,6 +143,11 @@ class Slots {
   }
 
  private:
+  void PutBirth(Slot slot, Stamp born) {
+    born_.Touch(slot, born);
+    if (slot >= limit_) limit_ = slot + 1;
+  }
+
   void MakeFree(Slot slot) {
     free_.Set(slot);
     if (slot < first_free_hint_) first_free_hint_ = slot;
