@@ -116,6 +116,13 @@ void FlipBitOfFile(const fs::path& path, std::mt19937& random) {
   file.put(static_cast<char>(byte ^ 1 << random() % 8));
 }
 
+// Not what is only there for people, or not looked at again.
+bool IsRead(const fs::path& path) {
+  const std::string name = path.filename().string();
+  return absl::EndsWith(name, ".log") || absl::EndsWith(name, ".sst") || absl::StartsWith(name, "MANIFEST") ||
+         name == "CURRENT" || name == "dynmesh.synced";
+}
+
 class RocksDbRig final : public StoreRig {
  public:
   absl::StatusOr<std::unique_ptr<Store>> Open(const CommitterOptions& options) override {
@@ -131,12 +138,12 @@ class RocksDbRig final : public StoreRig {
     }
   }
 
-  // Every file is as likely as any other: the small ones matter most.
+  // Every file that is read is as likely as any other: the small ones matter most.
   void FlipBit(std::mt19937& random) override {
     std::vector<fs::path> files;
     for (const auto& entry : fs::recursive_directory_iterator(directory_.path())) {
-      const bool told_only = entry.path().filename() == "LOG" || entry.path().filename() == "dynmesh.lock";
-      if (entry.is_regular_file() && entry.file_size() > 0 && !told_only) files.push_back(entry.path());
+      if (entry.is_regular_file() && entry.file_size() > 0 && IsRead(entry.path()))
+        files.push_back(entry.path());
     }
     std::sort(files.begin(), files.end());
     FlipBitOfFile(files[random() % files.size()], random);
