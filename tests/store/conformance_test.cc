@@ -166,12 +166,12 @@ TEST_P(ConformanceTest, ACheckpointKeepsThePagesThatItDoesNotMention) {
   EXPECT_TRUE((*writer)->DropPage(9).ok());
   EXPECT_TRUE((*writer)->DropPage(10).ok());
   EXPECT_TRUE((*writer)->Commit("second").ok());
+  writer->reset();
   const SessionContents expected{4, "second", {{1, "a"}, {2, "BB"}}, {}};
   EXPECT_EQ(ContentsOf(session), expected);
   SessionStore& again = ReopenNamed("part");
   EXPECT_EQ(ContentsOf(again), expected);
   EXPECT_EQ(again.last_revision(), 4);
-  writer->reset();
   Commit(again, 4, {{1, ""}});
   EXPECT_THAT(ContentsOf(again).pages, ElementsAre(Pair(1, ""), Pair(2, "BB")));
 }
