@@ -49,16 +49,19 @@ std::vector<std::string> PartsOfDocument() {
   return parts;
 }
 
+/// A line for each.
+std::string HexOf(const std::vector<std::string>& parts) {
+  std::string lines;
+  for (const std::string& part : parts) absl::StrAppend(&lines, absl::BytesToHexString(part), "\n");
+  return lines;
+}
+
 TEST(ArchiveFormatTest, TheDocumentsExampleIsWhatTheCodeWrites) {
   const Example example = MakeExample();
   std::vector<std::string> expected = {example.archive.head};
   for (const auto& [id, page] : example.archive.pages) expected.push_back(page);
   expected.push_back(example.archive.records[0]);
-  const std::vector<std::string> parts = PartsOfDocument();
-  ASSERT_EQ(parts.size(), expected.size());
-  for (size_t i = 0; i < parts.size(); ++i) {
-    EXPECT_EQ(absl::BytesToHexString(parts[i]), absl::BytesToHexString(expected[i])) << i;
-  }
+  EXPECT_EQ(HexOf(PartsOfDocument()), HexOf(expected));
 }
 
 TEST(ArchiveFormatTest, TheDocumentsExampleGivesItsMesh) {
