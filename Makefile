@@ -3,13 +3,14 @@
 
 JOBS ?= $(shell nproc)
 
-.PHONY: help demo test configure sanitize asan tsan bench image-test clean
+.PHONY: help demo test configure sanitize asan tsan bench torture image-test clean
 
 help:
 	@echo "make demo [MESH=path]  set up, build, and drag a hole through a real mesh with four followers"
 	@echo "make test              set up, build, and run all tests"
 	@echo "make sanitize          the tests under AddressSanitizer + UBSan, and core under ThreadSanitizer"
 	@echo "make bench [MESHES=dir] time core against flat arrays and other libraries (quiet machine, 20 minutes)"
+	@echo "make torture           kill a daemon 200 times while edits stream in; nothing may be lost"
 	@echo "make image-test        build the container image and make one edit through it"
 	@echo "make clean             remove build/"
 
@@ -42,6 +43,10 @@ endef
 bench:
 	@scripts/setup.sh build bench demo
 	@MESHES="$(MESHES)" tests/bench/run.sh
+
+torture: configure
+	@cmake --build --preset dev -j $(JOBS) --target dynmeshd dynmesh_python
+	@DYNMESH_TORTURE_KILLS=200 ctest --preset dev -R python_test_torture
 
 image-test: configure
 	@cmake --build --preset dev -j $(JOBS) --target dynmesh_python

@@ -33,6 +33,12 @@ ABSL_FLAG(std::vector<std::string>, listen, {"127.0.0.1:7447"},
 ABSL_FLAG(std::string, unix_socket, "", "Path of a unix socket to listen on too");
 ABSL_FLAG(bool, allow_insecure, false,
           "Allow addresses that other machines can reach, although nothing is encrypted or authenticated");
+ABSL_FLAG(std::string, data_dir, "",
+          "Directory to keep sessions in, made if it is not there; empty: sessions end with the daemon");
+ABSL_FLAG(absl::Duration, async_delay, dynmesh::ServerOptions().async_delay,
+          "What a loss of power may take of sessions that are kept with DURABILITY_ASYNC");
+ABSL_FLAG(uint64_t, checkpoint_bytes, dynmesh::ServerOptions().checkpoint_bytes,
+          "Log of a session before another checkpoint is written, which keeps loading it quick");
 ABSL_FLAG(std::string, ready_file, "",
           "File that is written, one address a line, when the server is serving; removed at the end");
 ABSL_FLAG(std::string, log_level, "info", "trace, debug, info, warn, error or off");
@@ -156,6 +162,9 @@ ServerOptions OptionsFromFlags() {
   }
   options.unix_socket = absl::GetFlag(FLAGS_unix_socket);
   options.allow_insecure = absl::GetFlag(FLAGS_allow_insecure);
+  options.data_dir = absl::GetFlag(FLAGS_data_dir);
+  options.async_delay = absl::GetFlag(FLAGS_async_delay);
+  options.checkpoint_bytes = absl::GetFlag(FLAGS_checkpoint_bytes);
   options.limits = LimitsFromFlags();
   options.quick_threads = absl::GetFlag(FLAGS_quick_threads);
   options.heavy_threads = absl::GetFlag(FLAGS_heavy_threads);

@@ -29,6 +29,8 @@
 #include "server/rpc/sessions_service.h"
 #include "server/rpc/subscriptions_service.h"
 #include "server/session/session_errors.h"
+#include "server/store/local_store.h"
+#include "server/store/rocksdb_engine.h"
 #include "spdlog/spdlog.h"
 
 namespace dynmesh {
@@ -114,6 +116,16 @@ int HeavyThreads(const ServerOptions& options) {
   return static_cast<int>(std::min(options.limits.max_concurrent_imports, 16u)) + 4;
 }
 
+/// Null without a directory.
+absl::StatusOr<std::unique_ptr<Store>> OpenStore(const ServerOptions& options) {
+  if (options.data_dir.empty()) return std::unique_ptr<Store>();
+  if (options.async_delay < absl::ZeroDuration()) {
+    return InvalidArgument(reason::kBadArgument, "async_delay is negative", {{"field", "async_delay"}});
+  }
+  DYNMESH_ASSIGN_OR_RETURN(std::unique_ptr<Engine> engine, OpenRocksDb({options.data_dir}));
+  return LocalStore::Open(std::move(engine), {.async_delay = options.async_delay});
+}
+
 }  // namespace
 
 absl::Status CheckLoopback(absl::string_view address) {
@@ -127,10 +139,11 @@ absl::Status CheckLoopback(absl::string_view address) {
 /// Members are destroyed from the last to the first: gRPC, then the threads, then the sessions.
 class Server::Impl {
  public:
-  explicit Impl(const ServerOptions& options)
+  Impl(const ServerOptions& options, std::unique_ptr<Store> store)
       : quick_(ExecutorOptions("quick", QuickThreads(options), options.limits)),
         heavy_(ExecutorOptions("heavy", HeavyThreads(options), options.limits)),
-        registry_(options.limits, Workers{&quick_, &heavy_, &timer_}) {
+        registry_(options.limits, Workers{&quick_, &heavy_, &timer_}, std::move(store),
+                  {.checkpoint_bytes = options.checkpoint_bytes}) {
     const ServiceContext context{registry_, streams_};
     services_.push_back(MakeSessionsService(context));
     services_.push_back(MakeEditsService(context));
@@ -230,7 +243,9 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(const ServerOptions& optio
   gpr_set_log_function(LogForGrpc);
   grpc::EnableDefaultHealthCheckService(true);
   grpc::reflection::InitProtoReflectionServerBuilderPlugin();
-  auto impl = std::make_unique<Impl>(options);
+  DYNMESH_ASSIGN_OR_RETURN(std::unique_ptr<Store> store, OpenStore(options));
+  auto impl = std::make_unique<Impl>(options, std::move(store));
+  DYNMESH_RETURN_IF_ERROR(impl->registry().AddStored());
   DYNMESH_RETURN_IF_ERROR(impl->Listen(options));
   return std::unique_ptr<Server>(new Server(std::move(impl)));
 }

@@ -20,6 +20,12 @@ struct ServerOptions {
   std::string unix_socket;
   /// Needed for any address that others than this machine can reach: nothing is encrypted or authenticated.
   bool allow_insecure = false;
+  /// Where sessions are kept; empty: they end with the process. Made if it is not there.
+  std::string data_dir;
+  /// What a loss of power may take of sessions with DURABILITY_ASYNC.
+  absl::Duration async_delay = absl::Milliseconds(50);
+  /// Records of a session of so many bytes make a checkpoint due, which keeps its loading short.
+  uint64_t checkpoint_bytes = uint64_t{64} << 20;
   Limits limits;
   int quick_threads = 0;  ///< 0: four for each processor, at least 8
   int heavy_threads = 0;  ///< 0: four more than max_concurrent_imports
@@ -38,7 +44,7 @@ absl::Status CheckLoopback(absl::string_view address);
 class Server {
  public:
   /// Errors: INVALID_ARGUMENT for an address that is malformed or not loopback without allow_insecure;
-  /// UNAVAILABLE when an address is taken.
+  /// UNAVAILABLE when an address is taken; those of OpenRocksDb and LocalStore::Open.
   static absl::StatusOr<std::unique_ptr<Server>> Start(const ServerOptions& options);
   ~Server();
 

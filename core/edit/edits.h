@@ -98,11 +98,10 @@ struct SmoothVerticesEdit {
 };
 inline constexpr uint32_t kMaxSmoothIterations = 1000;
 
-using Edit =
-    std::variant<AddVerticesEdit, RemoveVerticesEdit, MoveVerticesEdit, AddElementsEdit, RemoveElementsEdit,
-                 AddAttributeEdit, SetAttributeEdit, SplitEdgesEdit, CollapseEdgesEdit, SwapEdgesEdit,
-                 SwapFacesEdit, SplitElementsEdit, MergeVerticesEdit, DissolveVerticesEdit,
-                 SmoothVerticesEdit>;
+using Edit = std::variant<AddVerticesEdit, RemoveVerticesEdit, MoveVerticesEdit, AddElementsEdit,
+                          RemoveElementsEdit, AddAttributeEdit, SetAttributeEdit, SplitEdgesEdit,
+                          CollapseEdgesEdit, SwapEdgesEdit, SwapFacesEdit, SplitElementsEdit,
+                          MergeVerticesEdit, DissolveVerticesEdit, SmoothVerticesEdit>;
 
 /// Whether it splits, collapses, swaps, merges, dissolves or smooths.
 inline bool IsOperator(const Edit& edit) {

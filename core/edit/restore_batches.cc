@@ -38,7 +38,8 @@ absl::StatusOr<RestoredBatches> RestoreBatches(Mesh& mesh, absl::Span<const Batc
   result.checksum = now.checksum;
   result.counts = now.num_live;
   if (options.dry_run) result.images.clear();
-  DYNMESH_RETURN_IF_ERROR(EndBatch(mesh, options.dry_run ? BatchEnding::kRollBack : BatchEnding::kCommit));
+  const BatchEnding ending = options.dry_run ? BatchEnding::kRollBack : BatchEnding::kCommit;
+  DYNMESH_RETURN_IF_ERROR(EndBatch(mesh, ending, options.keeper));
   result.revision = mesh.revision();
   return result;
 }

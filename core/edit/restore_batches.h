@@ -9,6 +9,7 @@
 
 #include "absl/status/statusor.h"
 #include "absl/types/span.h"
+#include "core/edit/batch_keeper.h"
 #include "core/mesh/batch_image.h"
 #include "core/mesh/mesh.h"
 #include "core/mesh/work_meter.h"
@@ -22,6 +23,8 @@ struct RestoreOptions {
   WorkMeter& meter = WorkMeter::Unlimited();
   /// Images that are given back take no more than this: the first ones are left out.
   size_t max_image_bytes = std::numeric_limits<size_t>::max();
+  /// As BatchOptions::keeper.
+  BatchKeeper* keeper = nullptr;
 };
 
 /// What undoing or redoing batches did or, for a dry run, would have done.
@@ -37,8 +40,8 @@ struct RestoredBatches {
 /// revision. The first must fit `mesh`, and each other one what the one before leaves: images of batches,
 /// last batch first; to redo, what that gave, last first again.
 ///
-/// Errors: those of Mesh::Restore and of the meter. After an error or a dry run the mesh is as it was, to the
-/// last id and stamp. REQUIRES: no batch is open on `mesh`. Cost: that of Mesh::Restore.
+/// Errors: those of Mesh::Restore, of the meter and of the keeper. After an error or a dry run the mesh is as
+/// it was, to the last id and stamp. REQUIRES: no batch is open on `mesh`. Cost: that of Mesh::Restore.
 absl::StatusOr<RestoredBatches> RestoreBatches(Mesh& mesh, absl::Span<const BatchImage* const> images,
                                                const RestoreOptions& options);
 

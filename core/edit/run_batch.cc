@@ -33,8 +33,15 @@ absl::Status RunInBatch(Mesh& mesh, absl::FunctionRef<absl::Status()> fn) {
   return status;
 }
 
-absl::Status EndBatch(Mesh& mesh, BatchEnding ending) {
-  const absl::Status ended = ending == BatchEnding::kCommit ? mesh.Commit() : absl::OkStatus();
+absl::Status EndBatch(Mesh& mesh, BatchEnding ending, BatchKeeper* keeper) {
+  bool ran_out = false;
+  const absl::Status ended = Try(
+      [&]() -> absl::Status {
+        if (ending == BatchEnding::kRollBack) return absl::OkStatus();
+        if (keeper != nullptr) DYNMESH_RETURN_IF_ERROR(keeper->Keep(mesh));
+        return mesh.Commit();
+      },
+      ran_out);
   if (ending == BatchEnding::kRollBack || !ended.ok()) mesh.Rollback();
   return ended;
 }

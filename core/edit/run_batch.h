@@ -3,6 +3,7 @@
 
 #include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
+#include "core/edit/batch_keeper.h"
 #include "core/mesh/mesh.h"
 
 namespace dynmesh {
@@ -16,8 +17,9 @@ absl::Status RunInBatch(Mesh& mesh, absl::FunctionRef<absl::Status()> fn);
 /// What becomes of a batch.
 enum class BatchEnding { kCommit, kRollBack };
 
-/// Ends the open batch; one that cannot be committed is rolled back. Errors: those of Mesh::Commit.
-absl::Status EndBatch(Mesh& mesh, BatchEnding ending);
+/// Ends the open batch; one that cannot be kept or committed is rolled back. A null `keeper` keeps nothing.
+/// Errors: those of Keep(), also RESOURCE_EXHAUSTED when memory ran out in it, and of Mesh::Commit.
+absl::Status EndBatch(Mesh& mesh, BatchEnding ending, BatchKeeper* keeper = nullptr);
 
 /// Mesh::RollbackTo within fn() of RunInBatch. Memory that runs out here leaves a mesh that nobody can put
 /// back: no refusal, but std::runtime_error.

@@ -256,7 +256,8 @@ absl::StatusOr<BatchResult> ApplyBatch(Mesh& mesh, absl::Span<const Edit> edits,
   result.checksum = mesh.checksum();
   for (EntityKind kind : kEntityKinds) result.counts[Dimension(kind)] = mesh.NumLive(kind);
   const bool leaves_no_trace = options.dry_run || edits.empty();
-  DYNMESH_RETURN_IF_ERROR(EndBatch(mesh, leaves_no_trace ? BatchEnding::kRollBack : BatchEnding::kCommit));
+  const BatchEnding ending = leaves_no_trace ? BatchEnding::kRollBack : BatchEnding::kCommit;
+  DYNMESH_RETURN_IF_ERROR(EndBatch(mesh, ending, options.keeper));
   result.revision = mesh.revision();
   return result;
 }

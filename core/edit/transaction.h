@@ -11,6 +11,7 @@
 #include "absl/types/optional.h"
 #include "absl/types/span.h"
 #include "core/edit/batch_checker.h"
+#include "core/edit/batch_keeper.h"
 #include "core/edit/edits.h"
 #include "core/mesh/batch_image.h"
 #include "core/mesh/mesh.h"
@@ -92,6 +93,8 @@ struct BatchOptions {
   WorkMeter& meter = WorkMeter::Unlimited();
   /// Tell what undoes the batch (RestoreBatches).
   bool make_image = false;
+  /// Keeps what the batch did before it is committed. Null: nobody does.
+  BatchKeeper* keeper = nullptr;
 };
 
 /// Applies `edits` in order to `mesh`, all or nothing, as one revision.
@@ -102,7 +105,7 @@ struct BatchOptions {
 /// then derived, and is an element again counts as another one.
 ///
 /// Errors: those of Mesh's edits, with metadata "edit" (index in `edits`) and "index" (item of that edit);
-/// those of the checker.
+/// those of the checker and of the keeper.
 /// After an error or a dry run the mesh is as it was, to the last id and stamp.
 /// REQUIRES: no batch is open on `mesh`. Cost: linear in the entities touched.
 absl::StatusOr<BatchResult> ApplyBatch(Mesh& mesh, absl::Span<const Edit> edits, const BatchOptions& options);

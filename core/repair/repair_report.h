@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "core/mesh/ids.h"
@@ -47,6 +48,9 @@ class RepairReport {
     ++tally.count;
     if (tally.entities.size() < RepairTally::kMaxTold) tally.entities.push_back(entity);
   }
+
+  /// Says how often something was found.
+  void Put(RepairFinding finding, RepairTally tally) { tallies_[Index(finding)] = std::move(tally); }
 
   const RepairTally& Of(RepairFinding finding) const { return tallies_[Index(finding)]; }
   uint64_t Count(RepairFinding finding) const { return Of(finding).count; }

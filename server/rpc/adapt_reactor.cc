@@ -65,9 +65,11 @@ absl::Status AdaptReactor::Step(AccessGrant grant) {
   return absl::OkStatus();
 }
 
-absl::Status AdaptReactor::Conclude(AccessGrant) {
+absl::Status AdaptReactor::Conclude(AccessGrant grant) {
   DYNMESH_RETURN_IF_ERROR(stop_.Check());
   DYNMESH_ASSIGN_OR_RETURN(const AdaptResult result, adaptation_->Finish());
+  grant.Release();
+  DYNMESH_RETURN_IF_ERROR(adaptation_->session().WaitUntilAcknowledged(adaptation_->revision()));
   FromAdaptResult(result, adaptation_->revision(), result_.mutable_result());
   concluded_ = true;
   return absl::OkStatus();

@@ -66,6 +66,47 @@ struct ExportVisitor {
   }
 };
 
+absl::StatusOr<SessionDurability> ToDurability(v1::Durability durability) {
+  switch (durability) {
+    case v1::DURABILITY_UNSPECIFIED:
+      return SessionDurability::kDefault;
+    case v1::DURABILITY_NONE:
+      return SessionDurability::kNone;
+    case v1::DURABILITY_ASYNC:
+      return SessionDurability::kAsync;
+    case v1::DURABILITY_SYNC:
+      return SessionDurability::kSync;
+    default:
+      return BadField("durability", "there is no such durability");
+  }
+}
+
+v1::Durability FromDurability(SessionDurability durability) {
+  switch (durability) {
+    case SessionDurability::kDefault:
+      break;
+    case SessionDurability::kNone:
+      return v1::DURABILITY_NONE;
+    case SessionDurability::kAsync:
+      return v1::DURABILITY_ASYNC;
+    case SessionDurability::kSync:
+      return v1::DURABILITY_SYNC;
+  }
+  return v1::DURABILITY_UNSPECIFIED;
+}
+
+v1::SessionState FromState(SessionState state) {
+  switch (state) {
+    case SessionState::kLoaded:
+      return v1::SESSION_STATE_LOADED;
+    case SessionState::kStored:
+      return v1::SESSION_STATE_STORED;
+    case SessionState::kDamaged:
+      return v1::SESSION_STATE_DAMAGED;
+  }
+  return v1::SESSION_STATE_UNSPECIFIED;
+}
+
 /// Each storable, and named once.
 absl::StatusOr<std::vector<Relation>> ToStoredRelations(const v1::SessionSettings& message) {
   std::vector<Relation> relations;
@@ -95,6 +136,7 @@ absl::StatusOr<SessionSettings> ToSettings(const v1::SessionSettings& message) {
              message.duplicate_policy() != v1::DUPLICATE_POLICY_KEEP) {
     return BadField("duplicate_policy", "there is no such duplicate_policy");
   }
+  DYNMESH_ASSIGN_OR_RETURN(settings.durability, ToDurability(message.durability()));
   DYNMESH_ASSIGN_OR_RETURN(settings.stored_relations, ToStoredRelations(message));
   DYNMESH_ASSIGN_OR_RETURN(settings.checks, ToLocalCheckSettings(message.checks()));
   return settings;
@@ -122,7 +164,11 @@ v1::Session FromSessionInfo(const SessionInfo& info) {
   message.set_name(info.name);
   message.set_uid(info.uid);
   message.set_revision(info.revision);
+  message.set_durable_revision(info.durable_revision);
+  message.set_state(FromState(info.state));
+  message.set_state_message(info.state_message);
   message.set_etag(info.etag);
+  message.mutable_settings()->set_durability(FromDurability(info.settings.durability));
   message.mutable_settings()->set_duplicate_policy(info.settings.duplicates == DuplicatePolicy::kRefuse
                                                        ? v1::DUPLICATE_POLICY_REFUSE
                                                        : v1::DUPLICATE_POLICY_KEEP);

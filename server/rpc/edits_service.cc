@@ -18,15 +18,15 @@ grpc::ServerUnaryReactor* MoveInHistory(const UnaryCall& call, HistoryMove move,
                                         Response* response) {
   const absl::StatusOr<SessionPtr> found = call.services.registry.Find(request.session());
   const bool heavy = found.ok() && IsHeavyMove(request.count(), (*found)->num_history_items(move));
-  return RunOnSession(call, request.session(), {AccessMode::kWrite, heavy, request.ByteSizeLong()},
-                      [context = call.context, move, &request, response](const SessionPtr& session,
-                                                                         AccessGrant) -> absl::Status {
-                        DYNMESH_ASSIGN_OR_RETURN(
-                            const std::shared_ptr<const HistoryResult> result,
-                            session->MoveInHistory(move, ToHistoryOptions(request), CallStop(context)));
-                        FromHistoryResult(*result, response);
-                        return absl::OkStatus();
-                      });
+  return RunEdit(call, request.session(), {AccessMode::kWrite, heavy, request.ByteSizeLong()}, response,
+                 [context = call.context, move, &request, response](const SessionPtr& session,
+                                                                    const AccessGrant&) -> absl::Status {
+                   DYNMESH_ASSIGN_OR_RETURN(
+                       const std::shared_ptr<const HistoryResult> result,
+                       session->MoveInHistory(move, ToHistoryOptions(request), CallStop(context)));
+                   FromHistoryResult(*result, response);
+                   return absl::OkStatus();
+                 });
 }
 
 class EditsService final : public v1::EditService::CallbackService {
@@ -36,11 +36,11 @@ class EditsService final : public v1::EditService::CallbackService {
   grpc::ServerUnaryReactor* ApplyEdits(grpc::CallbackServerContext* context,
                                        const v1::ApplyEditsRequest* request,
                                        v1::ApplyEditsResponse* response) override {
-    return RunOnSession({"ApplyEdits", context, services_}, request->session(),
-                        {AccessMode::kWrite, /*heavy=*/false, MemoryOf(*request)},
-                        [context, request, response](const SessionPtr& session, AccessGrant) {
-                          return dynmesh::ApplyEdits(*session, *request, CallStop(context), response);
-                        });
+    return RunEdit({"ApplyEdits", context, services_}, request->session(),
+                   {AccessMode::kWrite, /*heavy=*/false, MemoryOf(*request)}, response,
+                   [context, request, response](const SessionPtr& session, const AccessGrant&) {
+                     return dynmesh::ApplyEdits(*session, *request, CallStop(context), response);
+                   });
   }
 
   grpc::ServerUnaryReactor* UndoEdits(grpc::CallbackServerContext* context,

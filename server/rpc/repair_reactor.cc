@@ -33,7 +33,10 @@ absl::Status RepairReactor::Post() {
                   [this, session](AccessGrant grant) {
                     absl::Status status = stop_.Check();
                     if (status.ok()) status = CatchExceptions([&] { return Repair(*session); });
+                    const int64_t revision = session->revision();
                     grant.Release();
+                    if (status.ok()) status = session->WaitUntilAcknowledged(revision);
+                    result_.mutable_result()->set_durable_revision(session->durable_revision());
                     EndWith(status);
                   });
 }

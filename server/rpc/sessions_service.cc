@@ -89,9 +89,19 @@ class ListSessionsCall {
       return Finish(absl::OkStatus());
     }
     const SessionPtr& session = sessions_[next_];
+    if (session->state() != SessionState::kLoaded) {  // nobody has to wait for it to be read
+      Add(session->Outline());
+      ++next_;
+      return Visit();
+    }
     const absl::Status posted = PostWork(call_.services, session, {AccessMode::kRead, IsLarge(*session)},
                                          [this](AccessGrant grant) { Describe(std::move(grant)); });
     if (!posted.ok()) Finish(posted);
+  }
+
+  void Add(const SessionInfo& info) {
+    *response_->add_sessions() = FromSessionInfo(info);
+    bytes_ += response_->sessions().rbegin()->ByteSizeLong();
   }
 
   void Describe(AccessGrant grant) {
@@ -99,8 +109,7 @@ class ListSessionsCall {
     if (!stopped.ok()) return Finish(stopped);
     const absl::Status described = CatchExceptions([this]() -> absl::Status {
       DYNMESH_ASSIGN_OR_RETURN(const SessionInfo info, sessions_[next_]->Info());
-      *response_->add_sessions() = FromSessionInfo(info);
-      bytes_ += response_->sessions().rbegin()->ByteSizeLong();
+      Add(info);
       return absl::OkStatus();
     });
     grant.Release();

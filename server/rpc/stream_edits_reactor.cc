@@ -87,9 +87,9 @@ void StreamEditsReactor::PumpOn() {
 
 StreamEditsReactor::Action StreamEditsReactor::Choose() {
   if (IsOver()) return Action::kFinish;
-  if (!writing_ && !responses_.empty() && !broken_) {
+  if (!writing_ && !responses_.empty() && responses_.front().ready && !broken_) {
     writing_ = true;
-    writing_from_ = std::move(responses_.front());
+    writing_from_ = std::move(responses_.front().message);
     responses_.pop_front();
     return Action::kWrite;
   }
@@ -106,7 +106,7 @@ StreamEditsReactor::Action StreamEditsReactor::Choose() {
 }
 
 bool StreamEditsReactor::IsOver() const {
-  if (applying_ || writing_) return false;
+  if (applying_ || writing_ || awaited_ > 0) return false;
   if (broken_) return true;
   // A read that is waiting ends by itself when the call does.
   return requests_.empty() && responses_.empty() && (draining_ || (closed_ && !reading_));
@@ -179,7 +179,31 @@ void StreamEditsReactor::ApplyOne(const SessionPtr& session, const Request& requ
   v1::StreamEditsResponse response;
   const absl::Status status =
       CatchExceptions([&] { return ApplyEdits(*session, request.batch, stop_, response.mutable_applied()); });
-  status.ok() ? Answer(std::move(response)) : Refuse(status, session->revision());
+  status.ok() ? AnswerWhenAcknowledged(session, std::move(response)) : Refuse(status, session->revision());
+}
+
+void StreamEditsReactor::AnswerWhenAcknowledged(const SessionPtr& session, v1::StreamEditsResponse response) {
+  Response* waiting = nullptr;  // stays where it is until it is ready and written
+  {
+    MutexLock lock(&mu_);
+    waiting = &responses_.emplace_back(Response{std::move(response), false});
+    ++awaited_;
+  }
+  session->AwaitAcknowledged(session->revision(), [this, session, waiting](const absl::Status& status) {
+    {
+      MutexLock lock(&mu_);
+      v1::StreamEditsResponse& message = waiting->message;
+      if (status.ok()) {
+        message.mutable_applied()->set_durable_revision(session->durable_revision());
+      } else {
+        FromError(status, message.mutable_error());
+        message.mutable_error()->set_revision(session->revision());
+      }
+      waiting->ready = true;
+      --awaited_;
+    }
+    Pump();
+  });
 }
 
 bool StreamEditsReactor::TakeRequest(const SessionPtr& session, Request* request) {
@@ -209,7 +233,7 @@ void StreamEditsReactor::Refuse(const absl::Status& status, int64_t revision) {
 void StreamEditsReactor::Answer(v1::StreamEditsResponse response) {
   {
     MutexLock lock(&mu_);
-    responses_.push_back(std::move(response));
+    responses_.push_back({std::move(response), true});
   }
   Pump();
 }

@@ -47,6 +47,12 @@ class StreamEditsReactor final
     absl::Status refused;  ///< not OK: found no room; the batch is empty then, but for its session
   };
 
+  /// An answer, to be written when those before it are and what it tells of may be acknowledged.
+  struct Response {
+    v1::StreamEditsResponse message;
+    bool ready;
+  };
+
   enum class Action { kNone, kRead, kApply, kWrite, kFinish };
 
   /// Does what there is to do. One thread at a time is in here: who comes meanwhile leaves it to that thread.
@@ -69,6 +75,9 @@ class StreamEditsReactor final
   bool TakeFirst(Request* request) ABSL_LOCKS_EXCLUDED(mu_);
   void Refuse(const absl::Status& status, int64_t revision) ABSL_LOCKS_EXCLUDED(mu_);
   void Answer(v1::StreamEditsResponse response) ABSL_LOCKS_EXCLUDED(mu_);
+  /// Answers once the session's revision may be acknowledged.
+  void AnswerWhenAcknowledged(const SessionPtr& session, v1::StreamEditsResponse response)
+      ABSL_LOCKS_EXCLUDED(mu_);
   void StopApplying() ABSL_LOCKS_EXCLUDED(mu_);
 
   const ServiceContext services_;
@@ -78,7 +87,8 @@ class StreamEditsReactor final
 
   Mutex mu_;
   std::deque<Request> requests_ ABSL_GUARDED_BY(mu_);
-  std::deque<v1::StreamEditsResponse> responses_ ABSL_GUARDED_BY(mu_);
+  std::deque<Response> responses_ ABSL_GUARDED_BY(mu_);
+  size_t awaited_ ABSL_GUARDED_BY(mu_) = 0;  ///< acknowledgements that are still to come
   size_t request_bytes_ ABSL_GUARDED_BY(mu_) = 0;  ///< of requests_
   bool pumping_ ABSL_GUARDED_BY(mu_) = false;      ///< for ever, once the call is finished
   bool reading_ ABSL_GUARDED_BY(mu_) = false;

@@ -47,25 +47,54 @@ grpc::ServerUnaryReactor* RunUnary(const char* rpc, grpc::CallbackServerContext*
   return reactor;
 }
 
-/// Answers a unary call by fn(session, grant), run when it is its turn at the session of that name.
-template <typename Fn>
-grpc::ServerUnaryReactor* RunOnSession(const UnaryCall& call, const std::string& session_name,
-                                       const SessionWork& work, Fn fn) {
+/// Runs fn(session, grant) when it is its turn at the session of that name, then end(session, revision,
+/// status), which finishes the reactor; `revision` is that of the session before others got their turn.
+template <typename Fn, typename End>
+grpc::ServerUnaryReactor* RunInTurn(const UnaryCall& call, const std::string& session_name,
+                                    const SessionWork& work, Fn fn, End end) {
   grpc::ServerUnaryReactor* reactor = call.context->DefaultReactor();
   const absl::StatusOr<SessionPtr> session = call.services.registry.Find(session_name);
   absl::Status posted = session.status();
   if (session.ok()) {
-    auto task = [call, reactor, session = *session, fn = std::move(fn)](AccessGrant grant) mutable {
+    auto task = [call, session = *session, fn = std::move(fn), end](AccessGrant grant) mutable {
       const absl::Status stopped = CallStop(call.context).Check();
       const absl::Status status =
           stopped.ok() ? CatchExceptions([&] { return fn(session, std::move(grant)); }) : stopped;
+      const int64_t revision = session->revision();
       grant.Release();
-      reactor->Finish(LoggedStatus(call.rpc, status));
+      end(session, revision, status);
     };
     posted = PostWork(call.services, *session, work, std::move(task));
   }
   if (!posted.ok()) reactor->Finish(LoggedStatus(call.rpc, posted));
   return reactor;
+}
+
+/// Answers a unary call by fn(session, grant), run when it is its turn at the session of that name.
+template <typename Fn>
+grpc::ServerUnaryReactor* RunOnSession(const UnaryCall& call, const std::string& session_name,
+                                       const SessionWork& work, Fn fn) {
+  const auto end = [call, reactor = call.context->DefaultReactor()](const SessionPtr&, int64_t,
+                                                                    const absl::Status& status) {
+    reactor->Finish(LoggedStatus(call.rpc, status));
+  };
+  return RunInTurn(call, session_name, work, std::move(fn), end);
+}
+
+/// The same for a call that edits: it is answered when what it did may be acknowledged. REQUIRES: fn keeps
+/// its turn to write; `response` has a durable_revision.
+template <typename Response, typename Fn>
+grpc::ServerUnaryReactor* RunEdit(const UnaryCall& call, const std::string& session_name,
+                                  const SessionWork& work, Response* response, Fn fn) {
+  const auto end = [call, response, reactor = call.context->DefaultReactor()](
+                       const SessionPtr& session, int64_t revision, const absl::Status& status) {
+    if (!status.ok()) return reactor->Finish(LoggedStatus(call.rpc, status));
+    session->AwaitAcknowledged(revision, [=](const absl::Status& acknowledged) {
+      response->set_durable_revision(session->durable_revision());
+      reactor->Finish(LoggedStatus(call.rpc, acknowledged));
+    });
+  };
+  return RunInTurn(call, session_name, work, std::move(fn), end);
 }
 
 }  // namespace dynmesh

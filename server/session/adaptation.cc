@@ -25,7 +25,7 @@ absl::Status Adaptation::Step() {
     if (bytes > most) return LimitExceeded("max_session_bytes", most, bytes);
     return mesh.MakeSavepoint() == before ? BatchEnding::kRollBack : BatchEnding::kCommit;
   };
-  return session_->EditMesh(edit, [](const Mesh&) {});
+  return session_->EditMesh(edit, [](const Mesh&) { return LoggedRequest{LoggedCall::kAdaptation}; });
 }
 
 absl::StatusOr<AdaptResult> Adaptation::Finish() {

@@ -70,7 +70,15 @@ void DeltaSource::Get(const DeltaKey& key, Callback done) {
 void DeltaSource::MakePending(const DeltaKey& key, AccessGrant grant) {
   const absl::StatusOr<PayloadPtr> made = CatchExceptions([&] { return Make(key, grant); });
   grant.Release();
-  Deliver(Publish(key, made), made);
+  if (!made.ok()) return Deliver(Publish(key, made), made);
+  // What is told must not be taken back.
+  session_.AwaitDurable((*made)->revision, [session = session_.shared_from_this(), key,
+                                            payload = *made](const absl::Status& durable) {
+    DeltaSource& self = session->deltas();
+    const absl::StatusOr<PayloadPtr> told =
+        durable.ok() ? absl::StatusOr<PayloadPtr>(payload) : absl::StatusOr<PayloadPtr>(durable);
+    self.Deliver(self.Publish(key, told), told);
+  });
 }
 
 PayloadPtr DeltaSource::FindKept(const DeltaKey& key) const {

@@ -60,7 +60,7 @@ struct DeltaKey {
 /// without; whoever asks meanwhile gets the same payload when it is ready, and whoever asks soon after finds
 /// it among the last few of that revision (kKeptPayloads, at most kKeptBytes). So a thousand followers at the
 /// same revision cost one encoding. A delta of more than kPartItems slots comes in parts, between which the
-/// lock is free.
+/// lock is free. A payload is handed out when the revision that it tells of is durable.
 ///
 /// Quantised positions lie on a grid for each number of bits, fixed when the first such delta with a vertex
 /// is made: the vertices' bounding cube then, widened by an eighth on each side.

@@ -13,34 +13,46 @@
 #include "absl/strings/string_view.h"
 #include "server/session/answer_memory.h"
 #include "server/session/budget.h"
+#include "server/session/durability/manifest.h"
 #include "server/session/importer/importer.h"
 #include "server/session/limits.h"
 #include "server/session/mutex.h"
 #include "server/session/session.h"
 #include "server/session/workers.h"
+#include "server/store/store.h"
 
 namespace dynmesh {
 
 /// The sessions of a daemon by name.
 ///
-/// Thread safety: full. Its lock is held for look-ups only, never while a session works.
+/// Thread safety: full. Its lock is held for look-ups only, never while a session works or the disk.
 class SessionRegistry {
  public:
-  SessionRegistry(const Limits& limits, const Workers& workers)
+  /// Without a store all sessions end with the process.
+  SessionRegistry(const Limits& limits, const Workers& workers, std::unique_ptr<Store> store = nullptr,
+                  const SessionLogOptions& log_options = {})
       : limits_(limits),
         workers_(workers),
+        store_(std::move(store)),
+        log_options_(log_options),
         import_gate_(limits),
         answer_budget_(std::make_shared<Budget>("max_answer_bytes", limits.max_answer_bytes)),
         adaptation_budget_(
             std::make_shared<Budget>("max_concurrent_adaptations", limits.max_concurrent_adaptations)) {}
 
+  /// Adds the sessions that the store has, without reading what they hold: Find() begins that. One that is
+  /// damaged is added as such. Call it once, before all else. Errors: those of Store::DeleteSession, for what
+  /// a crash has left half made.
+  absl::Status AddStored();
+
   /// Makes an empty session. The same request_id with the same name and settings: what the first call gave.
   /// Errors: INVALID_ARGUMENT BAD_SESSION_NAME, REQUEST_ID_REUSED; ALREADY_EXISTS SESSION_EXISTS;
-  /// RESOURCE_EXHAUSTED LIMIT_EXCEEDED (max_sessions); UNAVAILABLE SHUTTING_DOWN.
+  /// RESOURCE_EXHAUSTED LIMIT_EXCEEDED (max_sessions); UNAVAILABLE SHUTTING_DOWN; FAILED_PRECONDITION
+  /// NO_STORE; those of the store. May wait for the disk.
   absl::StatusOr<SessionInfo> Create(const std::string& name, const SessionSettings& settings,
                                      const std::string& request_id);
 
-  /// Errors: NOT_FOUND SESSION_NOT_FOUND.
+  /// Calls Session::EnsureLoaded(). Errors: NOT_FOUND SESSION_NOT_FOUND.
   absl::StatusOr<SessionPtr> Find(absl::string_view name) const;
 
   /// Up to `max_sessions` sessions with names after `after`, sorted by name.
@@ -64,17 +76,27 @@ class SessionRegistry {
   const Workers& workers() const { return workers_; }
 
  private:
-  absl::StatusOr<SessionPtr> Insert(const std::string& name, const SessionSettings& settings)
-      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
+  struct Creation;
+
+  absl::StatusOr<SessionInfo> CreateOnce(const Creation& creation) ABSL_EXCLUSIVE_LOCKS_REQUIRED(create_mu_);
+  absl::Status CheckCreation(const std::string& name) const ABSL_LOCKS_EXCLUDED(mu_);
+  absl::StatusOr<SessionPtr> MakeSession(const Creation& creation);
+  absl::StatusOr<std::unique_ptr<SessionLog>> MakeLog(const std::string& name,
+                                                      const SessionIdentity& identity);
+  absl::StatusOr<SessionPtr> OpenStored(const std::string& name) ABSL_EXCLUSIVE_LOCKS_REQUIRED(create_mu_);
+  std::unique_ptr<SessionLog> LogFor(std::unique_ptr<SessionStore> store, SessionDurability durability) const;
 
   const Limits limits_;
   const Workers workers_;
+  const std::unique_ptr<Store> store_;  ///< null: there is none. Outlives the sessions
+  const SessionLogOptions log_options_;
   ImportGate import_gate_;
   const std::shared_ptr<Budget> answer_budget_;
   const std::shared_ptr<Budget> adaptation_budget_;
+  Mutex create_mu_;  ///< held while a session is created, which may wait for the disk
   mutable Mutex mu_;
   std::map<std::string, SessionPtr, std::less<>> sessions_ ABSL_GUARDED_BY(mu_);
-  AnswerMemory<SessionInfo> created_ ABSL_GUARDED_BY(mu_);
+  AnswerMemory<SessionInfo> created_ ABSL_GUARDED_BY(create_mu_);
   bool draining_ ABSL_GUARDED_BY(mu_) = false;
 };
 

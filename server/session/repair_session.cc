@@ -5,6 +5,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/mesh/error.h"
+#include "server/session/durability/answer_codec.h"
 #include "server/session/fingerprint.h"
 #include "server/session/mesh_meter.h"
 #include "server/session/session_errors.h"
@@ -80,12 +81,13 @@ class SessionRepair {
     return request_.validate_only || unchanged ? BatchEnding::kRollBack : BatchEnding::kCommit;
   }
 
-  void Finish(const Mesh& mesh) {
+  LoggedRequest Finish(const Mesh& mesh) {
     outcome_.revision = mesh.revision();
-    if (remembered_ != nullptr) return;
+    if (remembered_ != nullptr) return {};
     remembered_ = std::make_shared<const RepairOutcome>(std::move(outcome_));
-    if (!once_) return;
+    if (!once_) return {LoggedCall::kRepair};
     session_.RememberRepair(request_.request_id, fingerprint_, remembered_, BytesOf(*remembered_));
+    return {LoggedCall::kRepair, request_.request_id, fingerprint_, EncodeAnswer(*remembered_)};
   }
 
   std::shared_ptr<const RepairOutcome> outcome() const { return remembered_; }
@@ -131,7 +133,7 @@ absl::StatusOr<std::shared_ptr<const RepairOutcome>> RepairSession(Session& sess
   }
   SessionRepair repair(session, request, stop, done);
   DYNMESH_RETURN_IF_ERROR(session.EditMesh([&](Mesh& mesh) { return repair.Edit(mesh); },
-                                           [&](const Mesh& mesh) { repair.Finish(mesh); }));
+                                           [&](const Mesh& mesh) { return repair.Finish(mesh); }));
   return repair.outcome();
 }
 

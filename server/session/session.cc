@@ -13,6 +13,8 @@
 #include "core/check/neighborhood_check.h"
 #include "core/mesh/error.h"
 #include "server/session/catch_exceptions.h"
+#include "server/session/durability/answer_codec.h"
+#include "server/session/durability/recover.h"
 #include "server/session/fingerprint.h"
 #include "server/session/mesh_meter.h"
 #include "server/session/session_errors.h"
@@ -21,15 +23,10 @@
 namespace dynmesh {
 namespace {
 
-constexpr size_t kMaxNameBytes = 64;
+constexpr size_t kMaxSessionNameBytes = 64;
 // A mesh is measured after so many new items, not for each batch.
 constexpr uint64_t kItemsBetweenChecks = 1000;
 constexpr uint64_t kBytesBetweenChecks = 64 << 10;
-
-std::string RandomUid() {
-  std::random_device device;
-  return absl::StrCat(absl::Hex(uint64_t{device()} << 32 | device(), absl::kZeroPad16));
-}
 
 uint64_t FingerprintOf(absl::Span<const Edit> edits, const ApplyOptions& options) {
   Fingerprint fingerprint;
@@ -58,6 +55,11 @@ size_t BytesOf(const BatchResult& result) {
     bytes += sizeof(warning) + warning.ids.size() * (sizeof(Slot) + sizeof(double));
   }
   return bytes;
+}
+
+LoggedRequest RequestOf(const ApplyOptions& options, uint64_t fingerprint, const BatchResult& result) {
+  if (options.request_id.empty()) return {LoggedCall::kEdit};
+  return {LoggedCall::kEdit, options.request_id, fingerprint, EncodeAnswer(result)};
 }
 
 bool Grows(const Edit& edit) {
@@ -107,7 +109,7 @@ absl::Status CheckSessionName(absl::string_view name) {
   const bool known_characters = std::all_of(name.begin(), name.end(), [](unsigned char c) {
     return absl::ascii_isalnum(c) || c == '_' || c == '.' || c == '-';
   });
-  if (!name.empty() && name.size() <= kMaxNameBytes && known_characters && absl::ascii_isalnum(name[0])) {
+  if (!name.empty() && name.size() <= kMaxSessionNameBytes && known_characters && absl::ascii_isalnum(name[0])) {
     return absl::OkStatus();
   }
   return InvalidArgument(
@@ -116,20 +118,39 @@ absl::Status CheckSessionName(absl::string_view name) {
       {{"field", "name"}});
 }
 
-Session::Session(const Options& options)
+Session::Session(const Options& options, std::unique_ptr<SessionLog> log, Content content)
     : options_(options),
-      uid_(RandomUid()),
-      create_time_(absl::Now()),
+      uid_(options.uid.empty() ? NewUid() : options.uid),
+      create_time_(options.create_time),
+      log_(std::move(log)),
       mesh_(MeshOptions{options.settings.duplicates, ToMeshLimits(options.limits)}),
       commit_time_(create_time_),
       history_(options.limits),
       checks_(options.settings.checks),
       spatial_(options.limits.max_session_bytes),
-      followers_(options.limits.max_followers),
+      followers_(std::make_shared<FollowerList>(options.limits.max_followers)),
       deltas_(*this) {
   // Nothing to fill: this cannot fail for relations that are storable.
   for (Relation relation : options.settings.stored_relations)
     mesh_.StoreRelation(relation, true).IgnoreError();
+  if (!options.damage.ok()) {
+    gone_ = options.damage;
+    state_ = SessionState::kDamaged;
+  }
+  if (log_ == nullptr) return;
+  log_->WatchDurable([followers = followers_] { followers->Wake(); });
+  if (content == Content::kEmpty) return;
+  gone_ = SessionLoading(name());
+  revision_ = log_->durable_revision();
+  state_ = SessionState::kStored;
+  load_begun_ = false;
+}
+
+Session::~Session() = default;
+
+std::string Session::NewUid() {
+  std::random_device device;
+  return absl::StrCat(absl::Hex(uint64_t{device()} << 32 | device(), absl::kZeroPad16));
 }
 
 absl::Status Session::Read(absl::FunctionRef<absl::Status(const SessionView&)> fn) const {
@@ -148,6 +169,8 @@ SessionInfo Session::Describe(const Mesh& mesh, const MeshSummary& summary, absl
   SessionInfo info = DescribeMesh(mesh, summary);
   info.name = name();
   info.uid = uid();
+  info.durable_revision = durable_revision();
+  info.settings.durability = options_.settings.durability;
   info.settings.duplicates = duplicates();
   info.settings.checks = checks();
   info.etag = EtagAt(info.revision);
@@ -157,7 +180,7 @@ SessionInfo Session::Describe(const Mesh& mesh, const MeshSummary& summary, absl
   info.history_bytes = history_bytes_.load();
   info.undoable_batches = num_undoable_.load();
   info.redoable_batches = num_redoable_.load();
-  info.followers = followers_.size();
+  info.followers = followers_->size();
   return info;
 }
 
@@ -172,10 +195,14 @@ absl::StatusOr<Session::AnswerPtr> Session::Apply(absl::Span<const Edit> edits, 
   {
     WriterMutexLock lock(&mu_);
     DYNMESH_RETURN_IF_ERROR(gone_);
-    answer = once ? ApplyOnce(edits, options, fingerprint, stop) : ApplyLocked(edits, options, stop);
+    answer = once ? ApplyOnce(edits, options, fingerprint, stop) : ApplyLocked(edits, options, 0, stop);
   }
-  if (revision() != revision_before) followers_.Wake();
+  if (revision() != revision_before) WakeFollowers();
   return answer;
+}
+
+void Session::WakeFollowers() {
+  if (log_ == nullptr) followers_->Wake();  // else the log does when it is durable
 }
 
 absl::StatusOr<Session::AnswerPtr> Session::ApplyOnce(absl::Span<const Edit> edits,
@@ -183,13 +210,14 @@ absl::StatusOr<Session::AnswerPtr> Session::ApplyOnce(absl::Span<const Edit> edi
                                                       const StopSignal& stop) {
   DYNMESH_ASSIGN_OR_RETURN(AnswerPtr remembered, answers_.Find(options.request_id, fingerprint));
   if (remembered != nullptr) return remembered;
-  DYNMESH_ASSIGN_OR_RETURN(AnswerPtr answer, ApplyLocked(edits, options, stop));
+  DYNMESH_ASSIGN_OR_RETURN(AnswerPtr answer, ApplyLocked(edits, options, fingerprint, stop));
   answers_.Remember(options.request_id, fingerprint, answer, BytesOf(*answer));
   return answer;
 }
 
 absl::StatusOr<Session::AnswerPtr> Session::ApplyLocked(absl::Span<const Edit> edits,
-                                                        const ApplyOptions& options, const StopSignal& stop) {
+                                                        const ApplyOptions& options, uint64_t fingerprint,
+                                                        const StopSignal& stop) {
   DYNMESH_RETURN_IF_ERROR(CheckRevisions(options));
   if (edits.empty()) return Unchanged();
   DYNMESH_ASSIGN_OR_RETURN(const bool is_large, CheckMemory(edits));
@@ -201,6 +229,7 @@ absl::StatusOr<Session::AnswerPtr> Session::ApplyLocked(absl::Span<const Edit> e
   if (options.report_lineage) batch.max_lineage = kMaxLineage;
   batch.conflict_policy = options.conflict_policy;
   batch.make_image = history_.keeps_batches();
+  batch.keeper = log_.get();
   batch.max_made = limits().max_batch_items;
   batch.max_work = kMaxBatchWork;
   const uint64_t used = std::any_of(edits.begin(), edits.end(), WritesRows) ? mesh_.memory_bytes() : 0;
@@ -218,6 +247,7 @@ absl::StatusOr<Session::AnswerPtr> Session::ApplyLocked(absl::Span<const Edit> e
   if (!options.validate_only) {
     Remember(std::exchange(result->image, absl::nullopt));
     Committed();
+    Log([&] { return RequestOf(options, fingerprint, *result); });
     if (is_large) MakeRoom(mesh_.memory_bytes());
   }
   return std::make_shared<const BatchResult>(*std::move(result));
@@ -247,15 +277,16 @@ absl::Status Session::RunEdit(absl::FunctionRef<absl::Status()> fn) {
 }
 
 absl::Status Session::EditMesh(absl::FunctionRef<absl::StatusOr<BatchEnding>(Mesh&)> edit,
-                               absl::FunctionRef<void(const Mesh&)> ended) {
+                               absl::FunctionRef<LoggedRequest(const Mesh&)> ended) {
   BatchEnding ending;
   {
     WriterMutexLock lock(&mu_);
     DYNMESH_RETURN_IF_ERROR(gone_);
     DYNMESH_ASSIGN_OR_RETURN(ending, EditLocked(edit));
-    ended(mesh_);
+    const LoggedRequest request = ended(mesh_);
+    if (ending == BatchEnding::kCommit) Log([&] { return request; });
   }
-  if (ending == BatchEnding::kCommit) followers_.Wake();
+  if (ending == BatchEnding::kCommit) WakeFollowers();
   return absl::OkStatus();
 }
 
@@ -270,7 +301,7 @@ absl::StatusOr<BatchEnding> Session::EditLocked(absl::FunctionRef<absl::StatusOr
   };
   DYNMESH_RETURN_IF_ERROR(RunEdit([&] {
     const absl::Status status = RunInBatch(mesh_, edit_and_note);
-    return status.ok() ? EndBatch(mesh_, *wanted) : status;
+    return status.ok() ? EndBatch(mesh_, *wanted, log_.get()) : status;
   }));
   items_since_check_ = kItemsBetweenChecks;
   if (*wanted == BatchEnding::kRollBack) return wanted;
@@ -342,19 +373,21 @@ void Session::Committed() {
 }
 
 absl::Status Session::Update(const SettingsUpdate& update, absl::string_view etag, const StopSignal& stop) {
-  WriterMutexLock lock(&mu_);
-  DYNMESH_RETURN_IF_ERROR(gone_);
-  DYNMESH_RETURN_IF_ERROR(CheckEtag(etag));
-  if (update.stored_relations.has_value()) {
-    DYNMESH_RETURN_IF_ERROR(StoreJust(mesh_, *update.stored_relations, limits().max_session_bytes, stop));
-    MakeRoom(mesh_.memory_bytes());
+  {
+    WriterMutexLock lock(&mu_);
+    DYNMESH_RETURN_IF_ERROR(gone_);
+    DYNMESH_RETURN_IF_ERROR(CheckEtag(etag));
+    if (update.stored_relations.has_value()) {
+      DYNMESH_RETURN_IF_ERROR(StoreJust(mesh_, *update.stored_relations, limits().max_session_bytes, stop));
+      MakeRoom(mesh_.memory_bytes());
+    }
+    if (update.checks.has_value()) {
+      MutexLock settings_lock(&settings_mu_);
+      checks_ = *update.checks;
+    }
+    ++num_updates_;
   }
-  if (update.checks.has_value()) {
-    MutexLock settings_lock(&settings_mu_);
-    checks_ = *update.checks;
-  }
-  ++num_updates_;
-  return absl::OkStatus();
+  return log_ == nullptr ? absl::OkStatus() : StoreIdentity();
 }
 
 absl::Status Session::CheckEmpty() const {
@@ -364,6 +397,7 @@ absl::Status Session::CheckEmpty() const {
 absl::Status Session::Adopt(Mesh& mesh) {
   {
     DYNMESH_RETURN_IF_ERROR(CheckEmpty());  // else the lock may be busy for long
+    if (log_ != nullptr) DYNMESH_RETURN_IF_ERROR(StoreImport(mesh));
     WriterMutexLock lock(&mu_);
     DYNMESH_RETURN_IF_ERROR(gone_);
     DYNMESH_RETURN_IF_ERROR(CheckEmpty());
@@ -372,7 +406,7 @@ absl::Status Session::Adopt(Mesh& mesh) {
     std::swap(mesh_, mesh);
     Committed();
   }
-  followers_.Wake();
+  followers_->Wake();  // an import is on disk before it is seen
   return absl::OkStatus();
 }
 
@@ -407,7 +441,7 @@ absl::StatusOr<int64_t> Session::Delete(absl::string_view etag) {
     DYNMESH_RETURN_IF_ERROR(CheckEtag(etag));
     gone_ = SessionDeleted(name());
   }
-  followers_.Close(SessionDeleted(name()));
+  followers_->Close(SessionDeleted(name()));
   return revision();
 }
 

@@ -13,6 +13,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
+#include "absl/time/clock.h"
 #include "absl/time/time.h"
 #include "absl/types/optional.h"
 #include "absl/types/span.h"
@@ -22,6 +23,7 @@
 #include "server/session/access_queue.h"
 #include "server/session/answer_memory.h"
 #include "server/session/delta_source.h"
+#include "server/session/durability/session_log.h"
 #include "server/session/follower_list.h"
 #include "server/session/history.h"
 #include "server/session/limits.h"
@@ -78,6 +80,8 @@ struct ImportOutcome;
 /// The same of a repair.
 struct RepairOutcome;
 
+struct RecoveredSession;
+
 /// INVALID_ARGUMENT BAD_SESSION_NAME unless `name` is 1-64 of [A-Za-z0-9_.-] and starts with a letter or
 /// digit.
 absl::Status CheckSessionName(absl::string_view name);
@@ -85,6 +89,7 @@ absl::Status CheckSessionName(absl::string_view name);
 /// A named mesh with its revision, its lock and its followers.
 ///
 ///     Session ── AccessQueue ── calls that wait for their turn
+///        ├────── SessionLog ── SessionStore: what outlives the process, if it is to
 ///        ├────── mu_ (reader/writer) ── Mesh, commit time, History, answers to request ids
 ///        ├────── SharedSpatialIndex ── read under the reader lock, with locks of its own
 ///        ├────── FollowerList ── Follower ── DeltaSink (an RPC stream)
@@ -102,13 +107,27 @@ class Session : public std::enable_shared_from_this<Session> {
     SessionSettings settings;  ///< at first
     Limits limits;
     Workers workers;
+    std::string uid = {};  ///< empty: a new one
+    absl::Time create_time = absl::Now();
+    absl::Status damage = absl::OkStatus();  ///< why what is stored cannot be had, if so
   };
 
-  explicit Session(const Options& options);
+  /// Where a session begins: empty, or what its log's store holds, which is read when it is asked for.
+  enum class Content { kEmpty, kStored };
+
+  /// Without a log it ends with the process.
+  explicit Session(const Options& options, std::unique_ptr<SessionLog> log = nullptr,
+                   Content content = Content::kEmpty);
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
+  ~Session();
+
+  /// 16 hexadecimal digits.
+  static std::string NewUid();
 
   const std::string& name() const { return options_.name; }
+  /// Whether a store has it.
+  bool is_stored() const { return log_ != nullptr || !options_.damage.ok(); }
   DuplicatePolicy duplicates() const { return options_.settings.duplicates; }
   const Limits& limits() const { return options_.limits; }
   const Workers& workers() const { return options_.workers; }
@@ -121,6 +140,23 @@ class Session : public std::enable_shared_from_this<Session> {
 
   /// Where calls wait for their turn to read or write this.
   AccessQueue& access() { return *access_; }
+
+  /// Begins to read a kStored session, once: whoever asks access() for a turn after that finds it there.
+  /// Until then, and where it cannot be read, calls fail with UNAVAILABLE SESSION_LOADING or DATA_LOSS.
+  /// Never waits.
+  void EnsureLoaded();
+
+  /// Calls `done` once the edit that made `revision` may be acknowledged: at once without a log, else as its
+  /// durability says. Errors: what the store says against it; then nobody knows whether it will be there
+  /// after a restart. Never waits.
+  using Done = SessionLog::Done;
+  void AwaitAcknowledged(int64_t revision, Done done);
+  /// The same for a thread that has nothing else to do.
+  absl::Status WaitUntilAcknowledged(int64_t revision);
+  /// As AwaitAcknowledged for when followers may be told of it: once it is on disk.
+  void AwaitDurable(int64_t revision, Done done);
+  /// The last revision that is on disk; without a log the last one. Never waits.
+  int64_t durable_revision() const { return log_ == nullptr ? revision() : log_->durable_revision(); }
 
   /// Calls fn under the reader lock and returns what it returns.
   absl::Status Read(absl::FunctionRef<absl::Status(const SessionView&)> fn) const ABSL_LOCKS_EXCLUDED(mu_);
@@ -139,6 +175,11 @@ class Session : public std::enable_shared_from_this<Session> {
 
   absl::StatusOr<SessionInfo> Info() const ABSL_LOCKS_EXCLUDED(mu_);
 
+  /// Whether Info() can be had. Never waits.
+  SessionState state() const { return state_.load(); }
+  /// What is known of a session that is not loaded. Takes the reader lock for a moment.
+  SessionInfo Outline() const ABSL_LOCKS_EXCLUDED(mu_);
+
   /// What Info() says when `mesh` is the content.
   SessionInfo Describe(const Mesh& mesh, const MeshSummary& summary, absl::Time update_time) const;
 
@@ -155,9 +196,10 @@ class Session : public std::enable_shared_from_this<Session> {
   /// Edits the mesh in whatever way, as one revision: calls edit(mesh) in an open batch, which then ends as
   /// that says, and then ended(mesh), both under the writer lock. For what is no list of edits. An edit that
   /// takes long must see itself that it stays within memory and that somebody waits for it (MeshMeter).
+  /// `ended` says what the log is to know of the request; it is not asked after a roll-back.
   /// Errors: those of edit; RESOURCE_EXHAUSTED. Nothing changed then, and ended is not called.
   absl::Status EditMesh(absl::FunctionRef<absl::StatusOr<BatchEnding>(Mesh&)> edit,
-                        absl::FunctionRef<void(const Mesh&)> ended) ABSL_LOCKS_EXCLUDED(mu_);
+                        absl::FunctionRef<LoggedRequest(const Mesh&)> ended) ABSL_LOCKS_EXCLUDED(mu_);
 
   /// Undoes the last batches, or redoes those that were undone last, all or nothing, as one revision.
   /// Errors: FAILED_PRECONDITION NOTHING_TO_UNDO or NOTHING_TO_REDO when there are not as many; ABORTED
@@ -220,7 +262,7 @@ class Session : public std::enable_shared_from_this<Session> {
   /// Where entities are; to be read while the session is.
   SharedSpatialIndex& spatial() const { return spatial_; }
 
-  FollowerList& followers() { return followers_; }
+  FollowerList& followers() { return *followers_; }
   DeltaSource& deltas() { return deltas_; }
 
  private:
@@ -232,7 +274,8 @@ class Session : public std::enable_shared_from_this<Session> {
   absl::Status CheckRevisions(const ApplyOptions& options) const ABSL_SHARED_LOCKS_REQUIRED(mu_);
   absl::Status CheckRevision(absl::optional<int64_t> if_revision) const ABSL_SHARED_LOCKS_REQUIRED(mu_);
   absl::StatusOr<AnswerPtr> ApplyLocked(absl::Span<const Edit> edits, const ApplyOptions& options,
-                                        const StopSignal& stop) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
+                                        uint64_t fingerprint, const StopSignal& stop)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
   absl::StatusOr<AnswerPtr> ApplyOnce(absl::Span<const Edit> edits, const ApplyOptions& options,
                                       uint64_t fingerprint, const StopSignal& stop)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
@@ -241,7 +284,8 @@ class Session : public std::enable_shared_from_this<Session> {
   absl::StatusOr<HistoryAnswerPtr> MoveOnce(HistoryMove move, const HistoryOptions& options,
                                             const StopSignal& stop) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
   absl::StatusOr<HistoryAnswerPtr> MoveLocked(HistoryMove move, const HistoryOptions& options,
-                                              const StopSignal& stop) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
+                                              uint64_t fingerprint, const StopSignal& stop)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
   /// The result of fn(), which edits mesh_. When that throws, an edit has been left half way: the session is
   /// damaged then, and its error is returned.
   absl::Status RunEdit(absl::FunctionRef<absl::Status()> fn) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
@@ -254,16 +298,34 @@ class Session : public std::enable_shared_from_this<Session> {
   void MakeRoom(uint64_t mesh_bytes) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
   AnswerPtr Unchanged() const ABSL_SHARED_LOCKS_REQUIRED(mu_);
   void Committed() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
+  /// Those who follow are told of what is committed, at once or when it is durable.
+  void WakeFollowers();
+
+  // session_durability.cc
+  void Load();
+  absl::Status LoadLocked(RecoveredSession& recovered) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
+  absl::Status RememberAgain(const LoggedRequest& request) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
+  /// Sends the batch that was just committed to the log, if there is one. What fails there is told to those
+  /// who await its revision.
+  void Log(absl::FunctionRef<LoggedRequest()> request) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
+  void StartCheckpoint();
+  void WriteCheckpoint();
+  absl::Status StoreImport(const Mesh& mesh) ABSL_LOCKS_EXCLUDED(mu_);
+  absl::Status StoreIdentity() ABSL_LOCKS_EXCLUDED(mu_);
 
   const Options options_;
   const std::string uid_;
   const absl::Time create_time_;
   const std::shared_ptr<AccessQueue> access_ = std::make_shared<AccessQueue>();
+  const std::unique_ptr<SessionLog> log_;
+  std::atomic<SessionState> state_{SessionState::kLoaded};
+  std::atomic<bool> load_begun_{true};
+  std::atomic<bool> writes_checkpoint_{false};
 
   mutable SharedMutex mu_;
   Mesh mesh_ ABSL_GUARDED_BY(mu_);
   absl::Time commit_time_ ABSL_GUARDED_BY(mu_);
-  absl::Status gone_ ABSL_GUARDED_BY(mu_);  ///< not OK: deleted, or damaged by a failure half way
+  absl::Status gone_ ABSL_GUARDED_BY(mu_);  ///< not OK: deleted, damaged by a failure half way, not loaded
   uint64_t items_since_check_ ABSL_GUARDED_BY(mu_) = 0;
   AnswerMemory<BatchResult> answers_ ABSL_GUARDED_BY(mu_);
   History history_ ABSL_GUARDED_BY(mu_);
@@ -275,6 +337,7 @@ class Session : public std::enable_shared_from_this<Session> {
   std::array<std::atomic<uint64_t>, 2> num_history_items_ = {};
   std::atomic<uint64_t> history_bytes_{0};
 
+  Mutex identity_mu_;  ///< held while the identity is stored
   mutable Mutex settings_mu_;
   CheckSettings checks_ ABSL_GUARDED_BY(settings_mu_);
 
@@ -286,7 +349,7 @@ class Session : public std::enable_shared_from_this<Session> {
 
   mutable SummaryCache summary_;
   mutable SharedSpatialIndex spatial_;
-  FollowerList followers_;
+  const std::shared_ptr<FollowerList> followers_;  ///< the log wakes them, whatever has become of this
   DeltaSource deltas_;
 };
 

@@ -75,6 +75,16 @@ absl::Status SessionDamaged(absl::string_view name) {
                    {{"session", std::string(name)}});
 }
 
+absl::Status SessionLoading(absl::string_view name) {
+  return MakeError(absl::StatusCode::kUnavailable, reason::kSessionLoading,
+                   absl::StrCat("session ", name, " is being loaded"), {{"session", std::string(name)}});
+}
+
+absl::Status NoStore() {
+  return FailedPrecondition(reason::kNoStore, "the daemon has no data directory to keep sessions in",
+                            {{"field", "durability"}});
+}
+
 absl::Status SessionNotEmpty(absl::string_view name, int64_t revision) {
   return FailedPrecondition(
       reason::kSessionNotEmpty,

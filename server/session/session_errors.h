@@ -48,6 +48,13 @@ absl::Status ImportIdle(absl::Duration timeout);
 /// DATA_LOSS INTERNAL: an edit ended half way, so what the session holds is not to be trusted.
 absl::Status SessionDamaged(absl::string_view name);
 
+/// UNAVAILABLE SESSION_LOADING: what it holds is being read from its store, or written to it for the first
+/// time.
+absl::Status SessionLoading(absl::string_view name);
+
+/// FAILED_PRECONDITION NO_STORE: the daemon keeps nothing, so no session can be durable.
+absl::Status NoStore();
+
 /// FAILED_PRECONDITION SESSION_NOT_EMPTY.
 absl::Status SessionNotEmpty(absl::string_view name, int64_t revision);
 

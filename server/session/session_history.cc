@@ -5,6 +5,7 @@
 
 #include "core/edit/restore_batches.h"
 #include "core/mesh/error.h"
+#include "server/session/durability/answer_codec.h"
 #include "server/session/fingerprint.h"
 #include "server/session/mesh_meter.h"
 #include "server/session/session.h"
@@ -21,6 +22,11 @@ uint64_t FingerprintOf(HistoryMove move, const HistoryOptions& options) {
   return fingerprint.value();
 }
 
+LoggedRequest RequestOf(const HistoryOptions& options, uint64_t fingerprint, const HistoryResult& result) {
+  if (options.request_id.empty()) return {LoggedCall::kHistory};
+  return {LoggedCall::kHistory, options.request_id, fingerprint, EncodeAnswer(result)};
+}
+
 }  // namespace
 
 absl::StatusOr<Session::HistoryAnswerPtr> Session::MoveInHistory(HistoryMove move,
@@ -33,9 +39,9 @@ absl::StatusOr<Session::HistoryAnswerPtr> Session::MoveInHistory(HistoryMove mov
     WriterMutexLock lock(&mu_);
     DYNMESH_RETURN_IF_ERROR(gone_);
     const bool once = !options.request_id.empty() && !options.validate_only;
-    answer = once ? MoveOnce(move, options, stop) : MoveLocked(move, options, stop);
+    answer = once ? MoveOnce(move, options, stop) : MoveLocked(move, options, 0, stop);
   }
-  if (revision() != revision_before) followers_.Wake();
+  if (revision() != revision_before) WakeFollowers();
   return answer;
 }
 
@@ -45,21 +51,23 @@ absl::StatusOr<Session::HistoryAnswerPtr> Session::MoveOnce(HistoryMove move, co
   DYNMESH_ASSIGN_OR_RETURN(HistoryAnswerPtr remembered,
                            history_answers_.Find(options.request_id, fingerprint));
   if (remembered != nullptr) return remembered;
-  DYNMESH_ASSIGN_OR_RETURN(HistoryAnswerPtr answer, MoveLocked(move, options, stop));
+  DYNMESH_ASSIGN_OR_RETURN(HistoryAnswerPtr answer, MoveLocked(move, options, fingerprint, stop));
   history_answers_.Remember(options.request_id, fingerprint, answer, sizeof(HistoryResult));
   return answer;
 }
 
 absl::StatusOr<Session::HistoryAnswerPtr> Session::MoveLocked(HistoryMove move, const HistoryOptions& options,
-                                                              const StopSignal& stop) {
+                                                              uint64_t fingerprint, const StopSignal& stop) {
   DYNMESH_RETURN_IF_ERROR(CheckRevision(options.if_revision));
   DYNMESH_ASSIGN_OR_RETURN(const std::vector<const BatchImage*> images, history_.Last(move, options.count));
   MeshMeter meter({.used_bytes = 0, .max_bytes = limits().max_session_bytes}, stop);
   absl::StatusOr<RestoredBatches> restored;
   const absl::Status edited = RunEdit([&] {
-    restored = RestoreBatches(
-        mesh_, images,
-        {.dry_run = options.validate_only, .meter = meter, .max_image_bytes = history_.max_bytes()});
+    restored = RestoreBatches(mesh_, images,
+                              {.dry_run = options.validate_only,
+                               .meter = meter,
+                               .max_image_bytes = history_.max_bytes(),
+                               .keeper = log_.get()});
     return restored.status();
   });
   if (!edited.ok()) return edited;
@@ -70,6 +78,7 @@ absl::StatusOr<Session::HistoryAnswerPtr> Session::MoveLocked(HistoryMove move, 
   }
   result.undoable_batches = history_.size(HistoryMove::kUndo);
   result.redoable_batches = history_.size(HistoryMove::kRedo);
+  if (!options.validate_only) Log([&] { return RequestOf(options, fingerprint, result); });
   return std::make_shared<const HistoryResult>(result);
 }
 

@@ -23,10 +23,26 @@ namespace dynmesh {
 /// A number for each EntityKind.
 using KindCounts = std::array<uint64_t, kNumEntityKinds>;
 
+/// When the edits of a session are acknowledged. Stored: never renumber.
+enum class SessionDurability : uint8_t {
+  kDefault = 0,  ///< kSync where the daemon has a store, else kNone
+  kNone = 1,     ///< at once; the session ends with the process
+  kAsync = 2,    ///< once written: a loss of power takes the last moments (CommitterOptions::async_delay)
+  kSync = 3,     ///< once on disk
+};
+
+/// Whether a session's content is in memory.
+enum class SessionState : uint8_t {
+  kLoaded,
+  kStored,   ///< it is read from the store when somebody uses the session
+  kDamaged,  ///< it cannot be read; the session can only be deleted
+};
+
 struct SessionSettings {
-  DuplicatePolicy duplicates = DuplicatePolicy::kKeep;  ///< fixed when the session is created
-  std::vector<Relation> stored_relations = {};          ///< each of kStorableRelations, once
-  CheckSettings checks = {};                            ///< local ones, made on each batch
+  DuplicatePolicy duplicates = DuplicatePolicy::kKeep;         ///< fixed when the session is created
+  std::vector<Relation> stored_relations = {};                 ///< each of kStorableRelations, once
+  CheckSettings checks = {};                                   ///< local ones, made on each batch
+  SessionDurability durability = SessionDurability::kDefault;  ///< fixed when the session is created
 };
 
 /// Settings of a session that are to be changed; those that are absent stay.
@@ -55,7 +71,10 @@ absl::Status StoreJust(Mesh& mesh, absl::Span<const Relation> wanted, uint64_t m
 struct SessionInfo {
   std::string name;
   std::string uid;
+  SessionState state = SessionState::kLoaded;
+  std::string state_message = {};  ///< why it is kDamaged
   int64_t revision = 0;
+  int64_t durable_revision = 0;  ///< the last one that is on disk; without durability, `revision`
   std::string etag;
   SessionSettings settings;
   absl::Time create_time;

@@ -66,11 +66,24 @@ absl::Status LocalSession::Load() {
 }
 
 absl::Status LocalSession::LoadCheckpoint() {
-  DYNMESH_ASSIGN_OR_RETURN(const auto payload, GetPayload(owned_.engine(), layout::ManifestKey(owned_.id())));
-  if (!payload.has_value()) return absl::OkStatus();
-  DYNMESH_ASSIGN_OR_RETURN(const layout::StoredManifest manifest, layout::ReadManifest(*payload));
-  progress_->checkpoint = progress_->last = manifest.revision;
+  DYNMESH_ASSIGN_OR_RETURN(const auto checkpoint, ReadManifest());
+  if (checkpoint.has_value()) progress_->checkpoint = progress_->last = checkpoint->revision;
   return absl::OkStatus();
+}
+
+absl::StatusOr<absl::optional<Checkpoint>> LocalSession::ReadManifest() const {
+  absl::optional<Checkpoint> checkpoint;
+  DYNMESH_ASSIGN_OR_RETURN(const auto payload, GetPayload(owned_.engine(), layout::ManifestKey(owned_.id())));
+  if (!payload.has_value()) return checkpoint;
+  DYNMESH_ASSIGN_OR_RETURN(const layout::StoredManifest manifest, layout::ReadManifest(*payload));
+  checkpoint = Checkpoint{manifest.revision, std::string(manifest.bytes)};
+  return checkpoint;
+}
+
+absl::StatusOr<absl::optional<Checkpoint>> LocalSession::FindCheckpoint() {
+  auto checkpoint = ReadManifest();
+  DYNMESH_RETURN_IF_ERROR(Named(checkpoint.status()));
+  return checkpoint;
 }
 
 absl::Status LocalSession::LoadRecords() {

@@ -19,7 +19,19 @@ namespace dynmesh {
 /// How far a session has come.
 struct SessionProgress {
   /// On the committer's thread.
-  void SetDurable(int64_t revision) { durable = std::max(durable.load(), revision); }
+  void SetDurable(int64_t revision) {
+    if (revision <= durable) return;
+    durable = revision;
+    MutexLock lock(&mu);
+    if (watcher) watcher(revision);
+  }
+  void Watch(SessionStore::Watcher new_watcher) {
+    MutexLock lock(&mu);
+    watcher = std::move(new_watcher);
+  }
+
+  Mutex mu;  ///< held while the watcher runs
+  SessionStore::Watcher watcher ABSL_GUARDED_BY(mu);
 
   std::atomic<int64_t> last{0};        ///< record or checkpoint
   std::atomic<int64_t> durable{0};     ///< the same, on disk
@@ -32,13 +44,17 @@ class LocalSession final : public SessionStore {
  public:
   /// Finds where the session stands; reads neither records nor pages. Errors: as those of SessionStore.
   static absl::StatusOr<std::unique_ptr<SessionStore>> Open(OwnedSession owned);
+  ~LocalSession() override { progress_->Watch(nullptr); }
 
   uint64_t fencing_token() const override { return owned_.token(); }
   int64_t last_revision() const override { return progress_->last; }
+  int64_t trimmed_revision() const override { return progress_->trimmed; }
   int64_t durable_revision() const override { return progress_->durable; }
+  void WatchDurable(Watcher watcher) override { progress_->Watch(std::move(watcher)); }
 
   void Append(Record record, Durability durability, Done done) override;
   absl::Status ReadRecords(int64_t after, RecordFn fn) override;
+  absl::StatusOr<absl::optional<Checkpoint>> FindCheckpoint() override;
   absl::StatusOr<absl::optional<Checkpoint>> ReadCheckpoint(PageFn fn) override;
   absl::StatusOr<std::unique_ptr<CheckpointWriter>> BeginCheckpoint(int64_t revision) override;
   absl::Status TrimRecords(int64_t revision) override;
@@ -52,6 +68,7 @@ class LocalSession final : public SessionStore {
   explicit LocalSession(OwnedSession owned) : owned_(std::move(owned)) {}
   absl::Status Load();
   absl::Status LoadCheckpoint();
+  absl::StatusOr<absl::optional<Checkpoint>> ReadManifest() const;
   absl::Status LoadRecords();
   absl::Status CheckAppend(const Record& record) const;
   absl::Status LoadPages();

@@ -73,6 +73,7 @@ class SessionStore {
   /// Called exactly once, on a thread of the store, never from within the call that was given it. Must be
   /// short and must not wait for the store.
   using Done = absl::AnyInvocable<void(const absl::Status&)>;
+  using Watcher = absl::AnyInvocable<void(int64_t durable_revision)>;
   using RecordFn = absl::FunctionRef<absl::Status(int64_t revision, absl::string_view bytes)>;
   using PageFn = absl::FunctionRef<absl::Status(PageKey page, absl::string_view bytes)>;
 
@@ -82,8 +83,13 @@ class SessionStore {
   virtual uint64_t fencing_token() const = 0;
   /// The revision of the last record or checkpoint, acknowledged or not; 0 when there is none.
   virtual int64_t last_revision() const = 0;
+  /// Records up to this revision are gone.
+  virtual int64_t trimmed_revision() const = 0;
   /// The last one that is known to survive a loss of power.
   virtual int64_t durable_revision() const = 0;
+  /// From now on `watcher` is called whenever that has grown, on a thread of the store; null: nobody is. It
+  /// must be short, and must not wait for the store. None runs any more when this or the destructor returns.
+  virtual void WatchDurable(Watcher watcher) = 0;
 
   /// Acknowledgements come in the order of the calls. A record that was not acknowledged may be found after a
   /// crash all the same, but only whole and only with all before it.
@@ -94,6 +100,9 @@ class SessionStore {
   /// Records with greater revisions than `after`, in order; fn's first error ends it and is returned.
   /// fn must not write to the store. Errors: OUT_OF_RANGE STORE_TRIMMED: the first ones are gone.
   virtual absl::Status ReadRecords(int64_t after, RecordFn fn) = 0;
+
+  /// The checkpoint that was committed last, without its pages.
+  virtual absl::StatusOr<absl::optional<Checkpoint>> FindCheckpoint() = 0;
 
   /// The checkpoint that was committed last, with its pages in ascending order; nullopt when there is none.
   /// Pages are handed out before the last one is known to be good: drop them on an error.

@@ -38,11 +38,14 @@ std::vector<Slot> SlotsOf(absl::Span<const VertexId> vertices) {
 
 }  // namespace
 
-Daemon::Daemon(const Limits& limits)
+Daemon::Daemon(const Limits& limits, std::unique_ptr<Store> store, const SessionLogOptions& log_options)
     : quick_({"quick", 3, limits.max_queued_tasks}),
       heavy_({"heavy", 2, limits.max_queued_tasks}),
       workers_{&quick_, &heavy_, &timer_},
-      registry_(limits, workers_) {}
+      registry_(limits, workers_, std::move(store), log_options) {
+  const absl::Status added = registry_.AddStored();
+  EXPECT_TRUE(added.ok()) << added;
+}
 
 Daemon::~Daemon() {
   registry_.Drain();

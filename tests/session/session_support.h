@@ -26,7 +26,9 @@ namespace dynmesh::testing {
 /// Threads, and sessions on them. Sessions may be used after Stop(), but nothing follows any more.
 class Daemon {
  public:
-  explicit Daemon(const Limits& limits = {});
+  /// With a store, what that has is there.
+  explicit Daemon(const Limits& limits = {}, std::unique_ptr<Store> store = nullptr,
+                  const SessionLogOptions& log_options = {});
   ~Daemon();
 
   SessionRegistry& registry() { return registry_; }

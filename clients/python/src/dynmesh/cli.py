@@ -25,6 +25,7 @@ from .cli_warnings import print_warnings, warning_records
 from .cli_watch import watch
 from .client import DEFAULT_TARGET, DEFAULT_TIMEOUT_S, Client, connect
 from .daemon import find_daemon
+from .durability import DURABILITY_NAMES
 from .edit_result import HistoryResult
 from .errors import DynmeshError
 from .files import read_mesh
@@ -122,6 +123,11 @@ def _add_writing(commands: Any) -> None:
     create.add_argument("file", metavar="FILE", nargs="?", help="any format that meshio reads")
     create.add_argument(
         "--duplicates", choices=("keep", "refuse"), default="keep", help="equal elements (keep)"
+    )
+    create.add_argument(
+        "--durability",
+        choices=DURABILITY_NAMES,
+        help="what acknowledges an edit: nothing, a write, the disk (sync, if the daemon has a data directory)",
     )
     _add_import_options(create)
     fill = _command(commands, "import", _import, "Fill an empty session from a mesh file.")
@@ -238,7 +244,9 @@ def _check_together(parser: argparse.ArgumentParser, args: argparse.Namespace) -
 def _create(args: argparse.Namespace) -> None:
     mesh = read_mesh(args.file) if args.file else None  # first: a file that cannot be read makes no session
     with _client(args) as client:
-        session = client.create_session(args.name, duplicates=args.duplicates)
+        session = client.create_session(
+            args.name, duplicates=args.duplicates, durability=args.durability
+        )
         if mesh is None:
             return _print_info(args, session.info())
         try:
@@ -423,6 +431,8 @@ def _print_info(args: argparse.Namespace, info: SessionInfo) -> None:
 
 
 def _row(info: SessionInfo) -> str:
+    if info.state != "loaded":
+        return f"{info.name:24} {info.revision:9} {info.state} {info.state_message}".rstrip()
     counts = " ".join(f"{count:10}" for count in info.counts)
     return f"{info.name:24} {info.revision:9} {counts}"
 
@@ -444,7 +454,10 @@ def _describe(info: SessionInfo) -> str:
         memory += f", and {info.index_bytes / 2**20:.1f} MiB of spatial indices"
     if info.history_bytes:
         memory += f", and {info.history_bytes / 2**20:.1f} MiB of history"
-    lines += [memory, f"followers  {info.followers}"]
+    lines += [memory, f"durability {info.durability}, revision {info.durable_revision} is on disk"]
+    if info.durability == "none":
+        lines[-1] = "durability none: it ends with the daemon"
+    lines.append(f"followers  {info.followers}")
     lines.append(f"history    {info.undoable_batches} batches to undo, {info.redoable_batches} to redo")
     if info.bounds is not None:
         low, high = (" ".join(f"{x:g}" for x in corner) for corner in info.bounds)

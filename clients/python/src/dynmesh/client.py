@@ -10,6 +10,7 @@ import grpc
 from ._calls import DEFAULT_MAX_MESSAGE_BYTES, Caller
 from .arguments import as_int64, as_request_id, as_text, as_word
 from .checks import CheckSettings, checks_to_proto
+from .durability import durability_to_proto
 from .info import SessionInfo, info_from_proto
 from .relations import RelationLike, relations_to_proto
 from .session import Session
@@ -72,6 +73,7 @@ class Client:
         name: str,
         *,
         duplicates: str = "keep",
+        durability: str | None = None,
         stored_relations: Iterable[RelationLike] = (),
         checks: CheckSettings = MappingProxyType({}),
         request_id: str | None = None,
@@ -85,6 +87,10 @@ class Client:
             1-64 characters of [A-Za-z0-9_.-], beginning with a letter or digit.
         duplicates : "keep" or "refuse"
             What happens to an element that equals a live one (same type, same vertices up to symmetry).
+        durability : "none", "async" or "sync", optional
+            When edits are acknowledged: at once, and the session ends with the daemon; once written, which a
+            loss of power may undo for a moment; once on disk. Default: "sync" where the daemon has a data
+            directory, else "none".
         stored_relations : iterable of (kind, kind)
             Relations to keep as tables: as in `Session.store_relations`.
         checks : mapping of str to severity, or to (severity, threshold)
@@ -95,10 +101,13 @@ class Client:
         Raises
         ------
         AlreadyExistsError, InvalidArgumentError
+        FailedPreconditionError
+            NO_STORE: the daemon has no data directory.
         """
         made = self.session(name)
         settings = sessions_pb2.SessionSettings(
             duplicate_policy=_POLICIES[as_word(duplicates, _POLICIES, "duplicates")],
+            durability=durability_to_proto(durability),
             stored_relations=relations_to_proto(stored_relations),
             checks=checks_to_proto(checks),
         )

@@ -120,6 +120,7 @@ def launch(
     binary: PathLike | None = None,
     *,
     listen: str | None = None,
+    data_dir: PathLike | None = None,
     flags: Sequence[str] = (),
     timeout: float = 30.0,
     grace: float = 10.0,
@@ -136,6 +137,8 @@ def launch(
         else ``dynmeshd`` in PATH.
     listen : str, optional
         Serve at "host:port" as well; port 0 means any free one (see `Daemon.addresses`).
+    data_dir : path, optional
+        Keep sessions there, made if it is not there: whoever launches with the same one has them again.
     flags : sequence of str
         Further flags of dynmeshd.
     timeout : float
@@ -157,6 +160,7 @@ def launch(
         f"--ready_file={ready_file}",
         f"--listen={listen or ''}",
         "--exit_with_parent",
+        *([] if data_dir is None else [f"--data_dir={Path(data_dir).absolute()}"]),
         *flags,
     ]
     daemon = Daemon(_start(arguments, directory), directory, grace)

@@ -13,6 +13,7 @@ from .arrays import Ids, Points, from_bytes
 from .attribute_types import POLICIES, SCALARS, Policy, default_policy, row_from_bytes
 from .checks import CheckSetting, check_name, checks_from_proto
 from .checksum import Checksum
+from .durability import durability_name, state_name
 from .kinds import EntityKind
 from .relations import Relation, relation_from_proto
 from .v1 import sessions_pb2, types_pb2
@@ -91,6 +92,15 @@ class SessionInfo:
     counts, estimated_counts, boundary_counts, element_counts : Counts
         Live entities; what Euler's formula estimates for them; those on the boundary; those that users
         inserted (wire edges, dangling faces, cells).
+    durable_revision : int
+        The last one that is on disk; followers are told of no later one. Without durability, `revision`.
+    durability : "none", "async" or "sync"
+        When edits are acknowledged: `Client.create_session`.
+    state : "loaded", "stored" or "damaged"
+        Whether it is in memory; of a stored one, which is loaded when it is used, and of a damaged one only
+        name, uid, revisions, settings and times are known.
+    state_message : str
+        Why it is damaged.
     uid : str
         Tells this session from an earlier or later one of the same name.
     euler_characteristic : int
@@ -112,6 +122,10 @@ class SessionInfo:
     revision: int
     etag: str
     duplicates: str  # "keep" or "refuse"
+    durability: str
+    durable_revision: int
+    state: str
+    state_message: str
     create_time: datetime
     update_time: datetime
     counts: Counts
@@ -139,6 +153,10 @@ class SessionInfo:
             "revision": self.revision,
             "etag": self.etag,
             "duplicates": self.duplicates,
+            "durability": self.durability,
+            "durable_revision": self.durable_revision,
+            "state": self.state,
+            "state_message": self.state_message,
             "create_time": self.create_time.isoformat(),
             "update_time": self.update_time.isoformat(),
             "counts": self.counts._asdict(),
@@ -196,6 +214,10 @@ def info_from_proto(message: sessions_pb2.Session) -> SessionInfo:
         revision=message.revision,
         etag=message.etag,
         duplicates="refuse" if refuses else "keep",
+        durability=durability_name(message.settings.durability),
+        durable_revision=message.durable_revision,
+        state=state_name(message.state),
+        state_message=message.state_message,
         create_time=message.create_time.ToDatetime(timezone.utc),
         update_time=message.update_time.ToDatetime(timezone.utc),
         counts=counts_from_proto(message.counts),

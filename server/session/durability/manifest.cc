@@ -1,0 +1,129 @@
+#include "server/session/durability/manifest.h"
+
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+#include "core/codec/bytes.h"
+#include "core/mesh/error.h"
+#include "server/store/store_errors.h"
+
+namespace dynmesh {
+namespace {
+
+constexpr uint64_t kFormat = 1;
+
+absl::Status CheckFormat(ByteReader& in, absl::string_view what) {
+  const uint64_t format = in.Varint();
+  if (!in.ok() || format == 0) return StoreDamaged(what);
+  return format <= kFormat ? absl::OkStatus() : StoreFormatNewer(format, kFormat);
+}
+
+void WriteText(absl::string_view text, ByteWriter& out) {
+  out.Varint(text.size());
+  out.Bytes(text);
+}
+
+std::string ReadText(ByteReader& in) {
+  const uint64_t size = in.Varint();
+  return std::string(in.Bytes(size));
+}
+
+void WriteChecks(const CheckSettings& checks, ByteWriter& out) {
+  std::vector<CheckKind> on;
+  for (CheckKind check : AllChecks()) {
+    if (!(checks[check] == CheckSettings()[check])) on.push_back(check);
+  }
+  out.Varint(on.size());
+  for (CheckKind check : on) {
+    WriteText(TraitsOf(check).name, out);
+    out.Fixed(static_cast<uint8_t>(checks[check].severity));
+    out.Fixed(checks[check].threshold);
+  }
+}
+
+/// Checks by names that this build does not know are passed over: they came and went with another one.
+bool ReadChecks(ByteReader& in, CheckSettings& checks) {
+  for (uint64_t count = in.Varint(); count > 0 && in.ok(); --count) {
+    const CheckKind check = FindCheck(ReadText(in));
+    const auto severity = in.Fixed<uint8_t>();
+    const auto threshold = in.Fixed<double>();
+    if (severity > static_cast<uint8_t>(Severity::kReject)) return false;
+    if (check == CheckKind::kUnspecified) continue;
+    if (!checks.Set(check, {static_cast<Severity>(severity), threshold}).ok()) return false;
+  }
+  return in.ok();
+}
+
+bool ReadRelations(ByteReader& in, std::vector<Relation>& relations) {
+  for (uint64_t count = in.Varint(); count > 0 && in.ok(); --count) {
+    const auto index = in.Fixed<uint8_t>();
+    if (index >= kNumStorableRelations) return false;
+    relations.push_back(kStorableRelations[index]);
+  }
+  return in.ok();
+}
+
+bool ReadSettings(ByteReader& in, SessionSettings& settings) {
+  const auto durability = in.Fixed<uint8_t>();
+  const auto duplicates = in.Fixed<uint8_t>();
+  const bool known = durability == static_cast<uint8_t>(SessionDurability::kAsync) ||
+                     durability == static_cast<uint8_t>(SessionDurability::kSync);
+  if (!known || duplicates > 1) return false;
+  settings.durability = static_cast<SessionDurability>(durability);
+  settings.duplicates = duplicates == 0 ? DuplicatePolicy::kKeep : DuplicatePolicy::kRefuse;
+  return ReadRelations(in, settings.stored_relations) && ReadChecks(in, settings.checks);
+}
+
+}  // namespace
+
+std::string EncodeManifest(const SessionManifest& manifest) {
+  ByteWriter out;
+  out.Varint(kFormat);
+  out.Fixed(absl::ToUnixMicros(manifest.commit_time));
+  out.Bytes(manifest.head);
+  return std::move(out).Take();
+}
+
+absl::StatusOr<SessionManifest> DecodeManifest(absl::string_view bytes) {
+  constexpr absl::string_view kWhat = "the manifest of a checkpoint is none";
+  ByteReader in(bytes);
+  DYNMESH_RETURN_IF_ERROR(CheckFormat(in, kWhat));
+  SessionManifest manifest;
+  manifest.commit_time = absl::FromUnixMicros(in.Fixed<int64_t>());
+  manifest.head = std::string(in.Bytes(in.remaining()));
+  if (!in.done()) return StoreDamaged(kWhat);
+  return manifest;
+}
+
+std::string EncodeIdentity(const SessionIdentity& identity) {
+  const SessionSettings& settings = identity.settings;
+  ByteWriter out;
+  out.Varint(kFormat);
+  WriteText(identity.uid, out);
+  out.Fixed(absl::ToUnixMicros(identity.create_time));
+  WriteText(identity.request_id, out);
+  out.Fixed(identity.fingerprint);
+  out.Fixed(static_cast<uint8_t>(settings.durability));
+  out.Fixed(static_cast<uint8_t>(settings.duplicates == DuplicatePolicy::kRefuse));
+  out.Varint(settings.stored_relations.size());
+  for (Relation relation : settings.stored_relations)
+    out.Fixed(static_cast<uint8_t>(StorableIndex(relation)));
+  WriteChecks(settings.checks, out);
+  return std::move(out).Take();
+}
+
+absl::StatusOr<SessionIdentity> DecodeIdentity(absl::string_view bytes) {
+  constexpr absl::string_view kWhat = "the identity of a session is none";
+  ByteReader in(bytes);
+  DYNMESH_RETURN_IF_ERROR(CheckFormat(in, kWhat));
+  SessionIdentity identity;
+  identity.uid = ReadText(in);
+  identity.create_time = absl::FromUnixMicros(in.Fixed<int64_t>());
+  identity.request_id = ReadText(in);
+  identity.fingerprint = in.Fixed<uint64_t>();
+  if (!ReadSettings(in, identity.settings) || !in.done()) return StoreDamaged(kWhat);
+  return identity;
+}
+
+}  // namespace dynmesh

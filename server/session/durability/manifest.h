@@ -1,0 +1,46 @@
+#ifndef DYNMESH_SERVER_SESSION_DURABILITY_MANIFEST_H_
+#define DYNMESH_SERVER_SESSION_DURABILITY_MANIFEST_H_
+
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+#include "absl/time/time.h"
+#include "server/session/session_info.h"
+
+/// What a session's store holds beside records and pages. Formats of their own, sealed by the store.
+namespace dynmesh {
+
+/// The manifest of a checkpoint: format (varint, 1), time of the last commit (int64, us since 1970), head
+/// (core/archive/head.h).
+struct SessionManifest {
+  absl::Time commit_time;
+  std::string head;
+};
+
+std::string EncodeManifest(const SessionManifest& manifest);
+/// Errors: FAILED_PRECONDITION STORE_FORMAT_NEWER; DATA_LOSS STORE_DAMAGED.
+absl::StatusOr<SessionManifest> DecodeManifest(absl::string_view bytes);
+
+/// What a session is beside its mesh: the value kIdentityName of its store.
+struct SessionIdentity {
+  std::string uid;
+  absl::Time create_time;
+  SessionSettings settings;
+  // Of the request that created it, for retries.
+  std::string request_id = {};
+  uint64_t fingerprint = 0;
+};
+
+inline constexpr char kIdentityName[] = "identity";
+
+/// Format (varint, 1), uid, creation (int64, us since 1970), request id, fingerprint (u64), durability (u8),
+/// duplicates (u8), stored relations (their places in kStorableRelations) and checks that are not as usual
+/// (name, severity, threshold); texts and lists begin with their length (varint).
+std::string EncodeIdentity(const SessionIdentity& identity);
+/// Errors: as DecodeManifest.
+absl::StatusOr<SessionIdentity> DecodeIdentity(absl::string_view bytes);
+
+}  // namespace dynmesh
+
+#endif  // DYNMESH_SERVER_SESSION_DURABILITY_MANIFEST_H_

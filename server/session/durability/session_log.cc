@@ -1,0 +1,158 @@
+#include "server/session/durability/session_log.h"
+
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+#include "core/archive/head.h"
+#include "core/archive/page.h"
+#include "core/mesh/error.h"
+#include "server/session/durability/manifest.h"
+
+namespace dynmesh {
+namespace {
+
+/// Pages that are encoded before edits get their turn again: about a millisecond.
+constexpr size_t kPagesAtOnce = 32;
+
+struct EncodedPage {
+  PageId id;
+  std::string bytes;  ///< empty: the mesh has it no more
+};
+
+PageKey KeyOf(PageId page) { return uint64_t{static_cast<uint8_t>(Dimension(page.kind))} << 32 | page.index; }
+
+EncodedPage Encode(const Mesh& mesh, PageId page) {
+  const bool is_there = page.index < NumPages(mesh.slots(page.kind).limit());
+  return {page, is_there ? EncodePage(mesh, page) : std::string()};
+}
+
+absl::Status Write(EncodedPage page, CheckpointWriter& writer) {
+  const PageKey key = KeyOf(page.id);
+  return page.bytes.empty() ? writer.DropPage(key) : writer.WritePage(key, std::move(page.bytes));
+}
+
+}  // namespace
+
+SessionLog::SessionLog(std::unique_ptr<SessionStore> store, const SessionLogOptions& options,
+                       Executor* executor)
+    : options_(options),
+      store_(std::move(store)),
+      executor_(executor),
+      acknowledged_(std::make_shared<RevisionGate>(store_->last_revision(), executor)),
+      durable_(std::make_shared<RevisionGate>(store_->durable_revision(), executor)) {}
+
+void SessionLog::WatchDurable(absl::AnyInvocable<void()> watcher) {
+  const auto shared = std::make_shared<absl::AnyInvocable<void()>>(std::move(watcher));
+  store_->WatchDurable([durable = durable_, executor = executor_, shared](int64_t revision) {
+    durable->Reach(revision);
+    executor->Post([shared] { (*shared)(); });
+  });
+}
+
+absl::Status SessionLog::Keep(const Mesh& mesh) {
+  DYNMESH_RETURN_IF_ERROR(status());
+  batch_ = encoder_.Encode(mesh, {});
+  MutexLock lock(&mu_);
+  dirty_.Add(mesh.journal());
+  return absl::OkStatus();
+}
+
+void SessionLog::Append(int64_t revision, absl::Time commit_time, const LoggedRequest& request) {
+  Record record{revision, EncodeLogRecord({commit_time, request, batch_})};
+  bytes_since_checkpoint_ += record.bytes.size();
+  {
+    MutexLock lock(&mu_);
+    records_.push_back({revision, record.bytes.size()});
+    record_bytes_ += record.bytes.size();
+  }
+  auto done = [revision, acknowledged = acknowledged_, durable = durable_](const absl::Status& status) {
+    if (status.ok()) return acknowledged->Reach(revision);
+    acknowledged->Fail(status);
+    durable->Fail(status);
+  };
+  store_->Append(std::move(record), options_.durability, std::move(done));
+}
+
+void SessionLog::Fail(const absl::Status& status) {
+  acknowledged_->Fail(status);
+  durable_->Fail(status);
+}
+
+absl::Status SessionLog::StoreAll(const Mesh& mesh, absl::Time commit_time) {
+  DYNMESH_RETURN_IF_ERROR(status());
+  DYNMESH_ASSIGN_OR_RETURN(const auto writer, store_->BeginCheckpoint(mesh.revision()));
+  DirtyPages all;
+  all.AddAll(mesh);
+  for (PageId page : all.List()) DYNMESH_RETURN_IF_ERROR(Write(Encode(mesh, page), *writer));
+  DYNMESH_RETURN_IF_ERROR(writer->Commit(EncodeManifest({commit_time, EncodeHead(mesh)})));
+  acknowledged_->Reach(mesh.revision());
+  durable_->Reach(mesh.revision());
+  return absl::OkStatus();
+}
+
+absl::Status SessionLog::WriteCheckpoint(Reader read) {
+  DYNMESH_RETURN_IF_ERROR(status());
+  DirtyPages pages;
+  SessionManifest manifest;
+  int64_t revision = 0;
+  DYNMESH_RETURN_IF_ERROR(read([&](const Mesh& mesh, absl::Time commit_time) {
+    manifest = {commit_time, EncodeHead(mesh)};
+    revision = mesh.revision();
+    bytes_since_checkpoint_ = 0;
+    MutexLock lock(&mu_);
+    pages = std::exchange(dirty_, {});
+    return absl::OkStatus();
+  }));
+  const absl::Status written = [&]() -> absl::Status {
+    DYNMESH_ASSIGN_OR_RETURN(const auto writer, store_->BeginCheckpoint(revision));
+    int64_t newest = revision;
+    DYNMESH_RETURN_IF_ERROR(WritePages(read, pages, *writer, newest));
+    // Pages may tell of later revisions than the head: those must not vanish when these stay.
+    DYNMESH_RETURN_IF_ERROR(durable_->Await(newest));
+    return writer->Commit(EncodeManifest(manifest));
+  }();
+  if (!written.ok()) {
+    MutexLock lock(&mu_);
+    dirty_.Add(pages);
+    return written;
+  }
+  return store_->TrimRecords(TakeSuperfluous(revision));
+}
+
+void SessionLog::NoteStored(const std::vector<StoredRecord>& records) {
+  MutexLock lock(&mu_);
+  records_.assign(records.begin(), records.end());
+  for (const StoredRecord& record : records) record_bytes_ += record.bytes;
+}
+
+int64_t SessionLog::TakeSuperfluous(int64_t revision) {
+  MutexLock lock(&mu_);
+  int64_t last = 0;
+  while (!records_.empty() && records_.front().revision <= revision &&
+         (records_.size() > options_.kept_records || record_bytes_ > options_.kept_bytes)) {
+    last = records_.front().revision;
+    record_bytes_ -= records_.front().bytes;
+    records_.pop_front();
+  }
+  return last;
+}
+
+absl::Status SessionLog::WritePages(Reader read, const DirtyPages& pages, CheckpointWriter& writer,
+                                    int64_t& newest) {
+  const std::vector<PageId> list = pages.List();
+  for (size_t begin = 0; begin < list.size(); begin += kPagesAtOnce) {
+    std::vector<EncodedPage> encoded;
+    DYNMESH_RETURN_IF_ERROR(read([&](const Mesh& mesh, absl::Time) {
+      for (size_t i = begin; i < std::min(begin + kPagesAtOnce, list.size()); ++i) {
+        encoded.push_back(Encode(mesh, list[i]));
+      }
+      newest = mesh.revision();
+      return absl::OkStatus();
+    }));
+    for (EncodedPage& page : encoded) DYNMESH_RETURN_IF_ERROR(Write(std::move(page), writer));
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace dynmesh

@@ -1,0 +1,180 @@
+// What a session does so that it outlives the process: its log, loading, checkpoints.
+
+#include <utility>
+
+#include "core/mesh/error.h"
+#include "server/session/catch_exceptions.h"
+#include "server/session/durability/answer_codec.h"
+#include "server/session/durability/manifest.h"
+#include "server/session/durability/recover.h"
+#include "server/session/session.h"
+#include "server/session/session_errors.h"
+#include "spdlog/spdlog.h"
+
+namespace dynmesh {
+namespace {
+
+/// Remembers an answer that was stored as bytes.
+template <typename Answer>
+absl::Status RememberIn(AnswerMemory<Answer>& memory, const LoggedRequest& request,
+                        absl::StatusOr<Answer> answer) {
+  if (!answer.ok()) return answer.status();
+  const absl::StatusOr<std::shared_ptr<const Answer>> known =
+      memory.Find(request.request_id, request.fingerprint);
+  if (known.ok() && *known != nullptr) return absl::OkStatus();
+  memory.Remember(request.request_id, request.fingerprint, std::make_shared<const Answer>(*std::move(answer)),
+                  request.answer.size());
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+// ---- Loading ----
+
+void Session::EnsureLoaded() {
+  if (load_begun_.exchange(true)) return;
+  access_->Post(AccessMode::kWrite, *workers().heavy,
+                [self = shared_from_this()](AccessGrant) { self->Load(); });
+}
+
+void Session::Load() {
+  absl::StatusOr<RecoveredSession> recovered;
+  const absl::Status read = CatchExceptions([&] {
+    recovered = RecoverSession(log_->store(), limits());
+    return recovered.status();
+  });
+  WriterMutexLock lock(&mu_);
+  if (!absl::IsUnavailable(gone_)) return;  // deleted meanwhile
+  const absl::Status loaded =
+      read.ok() ? CatchExceptions([&]() ABSL_NO_THREAD_SAFETY_ANALYSIS { return LoadLocked(*recovered); })
+                : read;
+  if (loaded.ok()) {
+    gone_ = absl::OkStatus();
+    state_ = SessionState::kLoaded;
+    spdlog::info("session_loaded name={} revision={}", name(), mesh_.revision());
+    return;
+  }
+  // What may be better next time is tried again then; what is damaged stays so.
+  if (absl::IsDataLoss(loaded) || absl::IsFailedPrecondition(loaded)) {
+    gone_ = loaded;
+    state_ = SessionState::kDamaged;
+  } else {
+    load_begun_ = false;
+  }
+  spdlog::error("session_not_loaded name={} error=\"{}\"", name(), loaded.ToString());
+}
+
+absl::Status Session::LoadLocked(RecoveredSession& recovered) {
+  DYNMESH_RETURN_IF_ERROR(
+      StoreJust(recovered.mesh, options_.settings.stored_relations, limits().max_session_bytes));
+  log_->NoteStored(recovered.records);
+  for (const LoggedRequest& request : recovered.requests) DYNMESH_RETURN_IF_ERROR(RememberAgain(request));
+  mesh_ = std::move(recovered.mesh);
+  Committed();
+  commit_time_ = recovered.commit_time;
+  return absl::OkStatus();
+}
+
+absl::Status Session::RememberAgain(const LoggedRequest& request) {
+  switch (request.call) {
+    case LoggedCall::kEdit:
+      return RememberIn(answers_, request, DecodeBatchResult(request.answer));
+    case LoggedCall::kHistory:
+      return RememberIn(history_answers_, request, DecodeHistoryResult(request.answer));
+    case LoggedCall::kRepair: {
+      MutexLock lock(&repairs_mu_);
+      return RememberIn(repairs_, request, DecodeRepairOutcome(request.answer));
+    }
+    case LoggedCall::kAdaptation:
+      break;  // has none
+  }
+  return absl::OkStatus();
+}
+
+SessionInfo Session::Outline() const {
+  SessionInfo info;
+  info.name = name();
+  info.uid = uid();
+  info.state = state();
+  info.revision = revision();
+  info.durable_revision = durable_revision();
+  info.settings = options_.settings;
+  info.create_time = create_time_;
+  info.update_time = create_time_;
+  info.etag = EtagAt(info.revision);
+  ReaderMutexLock lock(&mu_);
+  if (info.state == SessionState::kDamaged) info.state_message = std::string(gone_.message());
+  return info;
+}
+
+// ---- Logging ----
+
+void Session::AwaitAcknowledged(int64_t revision, Done done) {
+  if (log_ == nullptr) return done(absl::OkStatus());
+  log_->AwaitAcknowledged(revision, std::move(done));
+}
+
+absl::Status Session::WaitUntilAcknowledged(int64_t revision) {
+  return log_ == nullptr ? absl::OkStatus() : log_->WaitUntilAcknowledged(revision);
+}
+
+void Session::AwaitDurable(int64_t revision, Done done) {
+  if (log_ == nullptr) return done(absl::OkStatus());
+  log_->AwaitDurable(revision, std::move(done));
+}
+
+void Session::Log(absl::FunctionRef<LoggedRequest()> request) {
+  if (log_ == nullptr) return;
+  const absl::Status sent = CatchExceptions([&]() ABSL_NO_THREAD_SAFETY_ANALYSIS {
+    log_->Append(mesh_.revision(), commit_time_, request());
+    return absl::OkStatus();
+  });
+  if (!sent.ok()) log_->Fail(sent);
+  if (log_->IsCheckpointDue() && !writes_checkpoint_.exchange(true)) StartCheckpoint();
+}
+
+void Session::StartCheckpoint() {
+  workers().heavy->Post([self = shared_from_this()] { self->WriteCheckpoint(); });
+}
+
+void Session::WriteCheckpoint() {
+  const absl::Status written = CatchExceptions([&] {
+    return log_->WriteCheckpoint([this](absl::FunctionRef<absl::Status(const Mesh&, absl::Time)> fn) {
+      return Read([&](const SessionView& view) { return fn(view.mesh, view.commit_time); });
+    });
+  });
+  if (!written.ok() && !absl::IsNotFound(written)) {
+    spdlog::error("checkpoint_failed name={} error=\"{}\"", name(), written.ToString());
+  }
+  writes_checkpoint_ = false;
+}
+
+// ---- What is stored beside batches ----
+
+/// Nobody edits while this goes on: edits would be no part of what is stored.
+absl::Status Session::StoreImport(const Mesh& mesh) {
+  {
+    WriterMutexLock lock(&mu_);
+    DYNMESH_RETURN_IF_ERROR(gone_);
+    DYNMESH_RETURN_IF_ERROR(CheckEmpty());
+    gone_ = SessionLoading(name());
+  }
+  const absl::Status stored = CatchExceptions([&] { return log_->StoreAll(mesh, absl::Now()); });
+  WriterMutexLock lock(&mu_);
+  if (!absl::IsUnavailable(gone_)) return gone_;
+  gone_ = absl::OkStatus();
+  return stored;
+}
+
+absl::Status Session::StoreIdentity() {
+  MutexLock lock(&identity_mu_);
+  SessionIdentity identity{uid_, create_time_, options_.settings};
+  identity.settings.checks = checks();
+  DYNMESH_RETURN_IF_ERROR(Read([&](const SessionView& view) {
+    identity.settings.stored_relations = StoredRelationsOf(view.mesh);
+    return absl::OkStatus();
+  }));
+  return log_->store().PutValue(kIdentityName, EncodeIdentity(identity));
+}
+
+}  // namespace dynmesh
