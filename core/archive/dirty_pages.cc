@@ -15,6 +15,10 @@ void DirtyPages::Add(const DirtyPages& others) {
   }
 }
 
+void DirtyPages::Add(EntityKind kind, Slot begin, Slot end) {
+  for (Slot page = begin / kPageSlots; page < NumPages(end); ++page) pages_[Dimension(kind)].Set(page);
+}
+
 void DirtyPages::AddAll(const Mesh& mesh) {
   for (EntityKind kind : kEntityKinds) {
     for (Slot page = 0; page < NumPages(mesh.slots(kind).limit()); ++page) pages_[Dimension(kind)].Set(page);

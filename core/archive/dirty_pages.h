@@ -28,6 +28,8 @@ class DirtyPages {
   /// Pages of all slots and rows that the batch has touched.
   void Add(const Journal& journal);
   void Add(const DirtyPages& others);
+  /// Pages of the slots from `begin` to before `end`.
+  void Add(EntityKind kind, Slot begin, Slot end);
   /// Every page that the mesh has.
   void AddAll(const Mesh& mesh);
 

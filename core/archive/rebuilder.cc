@@ -112,7 +112,7 @@ bool Rebuilder::ReadPageColumns(EntityKind kind, const Range& range, ByteReader&
     if (!ReadColumnSection(in, section) || section.column < next_column) return false;
     next_column = section.column + 1;
     if (section.column >= mesh_.attributes_.size()) continue;
-    if (mesh_.attributes_[section.column].spec().kind != kind || !ReadColumn(section, range)) return false;
+    if (mesh_.attributes_[section.column].spec().kind != kind || !ReadColumn(section, range, nullptr)) return false;
   }
   return true;
 }
@@ -156,6 +156,7 @@ absl::Status Rebuilder::ReadRuns(EntityKind kind, int64_t revision, ByteReader& 
     slot += gap;
     if (count < 1 || count > in.remaining() || slot + count > max_slots) return RecordDamaged(revision);
     DYNMESH_RETURN_IF_ERROR(EnsureRows(kind, static_cast<Slot>(slot + count)));
+    changed_pages_.Add(kind, static_cast<Slot>(slot), static_cast<Slot>(slot + count));
     for (const uint64_t end = slot + count; slot < end; ++slot) {
       if (!rows.Read(row)) return RecordDamaged(revision);
       Put({kind, static_cast<Slot>(slot)}, row);
@@ -172,7 +173,7 @@ bool Rebuilder::ReadRecordColumns(int64_t revision, ByteReader& in) {
     next_column = section.column + 1;
     if (section.column >= mesh_.attributes_.size()) return false;
     const EntityKind kind = mesh_.attributes_[section.column].spec().kind;
-    if (!ReadColumn(section, {0, Limit(kind), revision})) return false;
+    if (!ReadColumn(section, {0, Limit(kind), revision}, &changed_pages_)) return false;
   }
   return true;
 }
@@ -191,7 +192,7 @@ absl::Status Rebuilder::AddColumns(absl::Span<const ColumnHead> columns) {
   return absl::OkStatus();
 }
 
-bool Rebuilder::ReadColumn(const ColumnSection& section, const Range& range) {
+bool Rebuilder::ReadColumn(const ColumnSection& section, const Range& range, DirtyPages* changed) {
   AttributeColumn& column = mesh_.attributes_[section.column];
   ColumnRowReader rows(column, range.begin, range.revision, section.bytes);
   ColumnRow row;
@@ -201,6 +202,7 @@ bool Rebuilder::ReadColumn(const ColumnSection& section, const Range& range) {
     if (row.slot / kPageSlots != std::exchange(charged_page, row.slot / kPageSlots)) {
       out_of_memory_ = Charge(column.BytesToSet({&row.slot, 1}));
       if (!out_of_memory_.ok()) return false;
+      if (changed != nullptr) changed->Add(column.spec().kind, row.slot, row.slot + 1);
     }
     column.SetRow(row.slot, row.row, row.stamp);
   }

@@ -10,6 +10,7 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 #include "core/archive/column_rows.h"
+#include "core/archive/dirty_pages.h"
 #include "core/archive/head.h"
 #include "core/archive/page.h"
 #include "core/archive/record.h"
@@ -51,6 +52,8 @@ class Rebuilder {
   absl::Status AddPage(absl::string_view page);
   /// Records up to the head's revision are passed over; then each must be of the revision after the last.
   absl::Status AddRecord(absl::string_view record);
+  /// Pages that are not as they were added, because of records: what the next checkpoint has to write.
+  const DirtyPages& changed_pages() const { return changed_pages_; }
   /// Of the head, or of the last record.
   int64_t revision() const { return mesh_.revision_; }
   absl::StatusOr<Mesh> Finish() &&;
@@ -74,7 +77,7 @@ class Rebuilder {
   absl::Status AddColumns(absl::Span<const ColumnHead> columns);
   bool ReadPageColumns(EntityKind kind, const Range& range, ByteReader& in);
   bool ReadRecordColumns(int64_t revision, ByteReader& in);
-  bool ReadColumn(const ColumnSection& section, const Range& range);
+  bool ReadColumn(const ColumnSection& section, const Range& range, DirtyPages* changed);
   absl::Status EnsureRows(EntityKind kind, Slot end);
   absl::Status Charge(uint64_t bytes);
   void Widen(const RowWidths& widths);
@@ -114,6 +117,7 @@ class Rebuilder {
   Mesh mesh_;
   BatchImage::Fit fit_;        ///< of the head or the last record
   int64_t newest_page_ = 0;    ///< revision
+  DirtyPages changed_pages_;
   uint64_t memory_bytes_ = 0;  ///< charged so far
   std::array<Slot, kNumEntityKinds> charged_slots_ = {};
   absl::Status out_of_memory_;  ///< why a column's rows were refused, if so

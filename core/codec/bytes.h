@@ -36,6 +36,11 @@ class ByteWriter {
   }
 
   void Bytes(absl::string_view bytes) { bytes_.append(bytes.data(), bytes.size()); }
+  /// Its length as a varint, then the bytes.
+  void Text(absl::string_view text) {
+    Varint(text.size());
+    Bytes(text);
+  }
   void Reserve(size_t size) { bytes_.reserve(size); }
 
   size_t size() const { return bytes_.size(); }
@@ -77,6 +82,11 @@ class ByteReader {
   absl::string_view Bytes(uint64_t size) {
     if (!Require(size)) return {};
     return absl::string_view(std::exchange(next_, next_ + size), size);
+  }
+
+  std::string Text() {
+    const uint64_t size = Varint();
+    return std::string(Bytes(size));
   }
 
   bool ok() const { return ok_; }

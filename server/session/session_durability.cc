@@ -67,7 +67,7 @@ void Session::Load() {
 absl::Status Session::LoadLocked(RecoveredSession& recovered) {
   DYNMESH_RETURN_IF_ERROR(
       StoreJust(recovered.mesh, options_.settings.stored_relations, limits().max_session_bytes));
-  log_->NoteStored(recovered.records);
+  log_->NoteStored(recovered.records, recovered.changed_pages);
   for (const LoggedRequest& request : recovered.requests) DYNMESH_RETURN_IF_ERROR(RememberAgain(request));
   mesh_ = std::move(recovered.mesh);
   Committed();

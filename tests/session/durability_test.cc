@@ -282,10 +282,10 @@ TEST_F(DurabilityTest, ADamagedSessionIsSetAsideAndOthersServe) {
   daemon_.reset();
   {
     const std::unique_ptr<Store> store = medium_.Open();
-    ASSERT_TRUE((*store->OpenSession("bad"))->PutValue(kIdentityName, "nonsense").ok());
+    ASSERT_TRUE((*store->OpenSession("bad"))->PutValue(kIdentityName, std::string("\x01", 1)).ok());
     auto records = *store->OpenSession("worse");
     std::promise<absl::Status> done;
-    records->Append({1, "nonsense"}, Durability::kSync, [&](const absl::Status& s) { done.set_value(s); });
+    records->Append({1, std::string("\x01", 1)}, Durability::kSync, [&](const absl::Status& s) { done.set_value(s); });
     ASSERT_TRUE(done.get_future().get().ok());
   }
   Restart();

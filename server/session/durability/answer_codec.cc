@@ -19,10 +19,7 @@ class AnswerWriter {
   }
   void Count(uint64_t count) { out_.Varint(count); }
 
-  void Text(absl::string_view text) {
-    Count(text.size());
-    out_.Bytes(text);
-  }
+  void Text(absl::string_view text) { out_.Text(text); }
 
   template <typename T>
   void Array(const std::vector<T>& values) {
@@ -77,10 +74,7 @@ class AnswerReader {
     return in_.Fixed<T>();
   }
 
-  std::string Text() {
-    const uint64_t size = in_.Varint();
-    return std::string(in_.Bytes(size));
-  }
+  std::string Text() { return in_.Text(); }
 
   template <typename T>
   std::vector<T> Array() {

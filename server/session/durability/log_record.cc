@@ -7,17 +7,7 @@
 namespace dynmesh {
 namespace {
 
-constexpr uint64_t kFormat = 1;
-
-void WriteText(absl::string_view text, ByteWriter& out) {
-  out.Varint(text.size());
-  out.Bytes(text);
-}
-
-std::string ReadText(ByteReader& in) {
-  const uint64_t size = in.Varint();
-  return std::string(in.Bytes(size));
-}
+constexpr uint64_t kRecordFormat = 1;
 
 bool IsLoggedCall(uint8_t call) {
   return call >= static_cast<uint8_t>(LoggedCall::kEdit) &&
@@ -29,12 +19,12 @@ bool IsLoggedCall(uint8_t call) {
 std::string EncodeLogRecord(const LogRecord& record) {
   ByteWriter out;
   out.Reserve(64 + record.request.answer.size() + record.batch.size());
-  out.Varint(kFormat);
+  out.Varint(kRecordFormat);
   out.Fixed(absl::ToUnixMicros(record.commit_time));
   out.Fixed(static_cast<uint8_t>(record.request.call));
-  WriteText(record.request.request_id, out);
+  out.Text(record.request.request_id);
   out.Fixed(record.request.fingerprint);
-  WriteText(record.request.answer, out);
+  out.Text(record.request.answer);
   out.Bytes(record.batch);
   return std::move(out).Take();
 }
@@ -43,13 +33,13 @@ absl::StatusOr<LogRecord> DecodeLogRecord(absl::string_view bytes) {
   ByteReader in(bytes);
   LogRecord record;
   const uint64_t format = in.Varint();
-  if (in.ok() && format > kFormat) return StoreFormatNewer(format, kFormat);
+  if (in.ok() && format > kRecordFormat) return StoreFormatNewer(format, kRecordFormat);
   record.commit_time = absl::FromUnixMicros(in.Fixed<int64_t>());
   const auto call = in.Fixed<uint8_t>();
   record.request.call = static_cast<LoggedCall>(call);
-  record.request.request_id = ReadText(in);
+  record.request.request_id = in.Text();
   record.request.fingerprint = in.Fixed<uint64_t>();
-  record.request.answer = ReadText(in);
+  record.request.answer = in.Text();
   record.batch = in.Bytes(in.remaining());
   if (!in.ok() || format == 0 || !IsLoggedCall(call)) return StoreDamaged("a record of a session is none");
   return record;

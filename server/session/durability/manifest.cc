@@ -11,22 +11,12 @@
 namespace dynmesh {
 namespace {
 
-constexpr uint64_t kFormat = 1;
+constexpr uint64_t kManifestFormat = 1;
 
-absl::Status CheckFormat(ByteReader& in, absl::string_view what) {
+absl::Status CheckManifestFormat(ByteReader& in, absl::string_view what) {
   const uint64_t format = in.Varint();
   if (!in.ok() || format == 0) return StoreDamaged(what);
-  return format <= kFormat ? absl::OkStatus() : StoreFormatNewer(format, kFormat);
-}
-
-void WriteText(absl::string_view text, ByteWriter& out) {
-  out.Varint(text.size());
-  out.Bytes(text);
-}
-
-std::string ReadText(ByteReader& in) {
-  const uint64_t size = in.Varint();
-  return std::string(in.Bytes(size));
+  return format <= kManifestFormat ? absl::OkStatus() : StoreFormatNewer(format, kManifestFormat);
 }
 
 void WriteChecks(const CheckSettings& checks, ByteWriter& out) {
@@ -36,7 +26,7 @@ void WriteChecks(const CheckSettings& checks, ByteWriter& out) {
   }
   out.Varint(on.size());
   for (CheckKind check : on) {
-    WriteText(TraitsOf(check).name, out);
+    out.Text(TraitsOf(check).name);
     out.Fixed(static_cast<uint8_t>(checks[check].severity));
     out.Fixed(checks[check].threshold);
   }
@@ -45,7 +35,7 @@ void WriteChecks(const CheckSettings& checks, ByteWriter& out) {
 /// Checks by names that this build does not know are passed over: they came and went with another one.
 bool ReadChecks(ByteReader& in, CheckSettings& checks) {
   for (uint64_t count = in.Varint(); count > 0 && in.ok(); --count) {
-    const CheckKind check = FindCheck(ReadText(in));
+    const CheckKind check = FindCheck(in.Text());
     const auto severity = in.Fixed<uint8_t>();
     const auto threshold = in.Fixed<double>();
     if (severity > static_cast<uint8_t>(Severity::kReject)) return false;
@@ -79,7 +69,7 @@ bool ReadSettings(ByteReader& in, SessionSettings& settings) {
 
 std::string EncodeManifest(const SessionManifest& manifest) {
   ByteWriter out;
-  out.Varint(kFormat);
+  out.Varint(kManifestFormat);
   out.Fixed(absl::ToUnixMicros(manifest.commit_time));
   out.Bytes(manifest.head);
   return std::move(out).Take();
@@ -88,7 +78,7 @@ std::string EncodeManifest(const SessionManifest& manifest) {
 absl::StatusOr<SessionManifest> DecodeManifest(absl::string_view bytes) {
   constexpr absl::string_view kWhat = "the manifest of a checkpoint is none";
   ByteReader in(bytes);
-  DYNMESH_RETURN_IF_ERROR(CheckFormat(in, kWhat));
+  DYNMESH_RETURN_IF_ERROR(CheckManifestFormat(in, kWhat));
   SessionManifest manifest;
   manifest.commit_time = absl::FromUnixMicros(in.Fixed<int64_t>());
   manifest.head = std::string(in.Bytes(in.remaining()));
@@ -99,10 +89,10 @@ absl::StatusOr<SessionManifest> DecodeManifest(absl::string_view bytes) {
 std::string EncodeIdentity(const SessionIdentity& identity) {
   const SessionSettings& settings = identity.settings;
   ByteWriter out;
-  out.Varint(kFormat);
-  WriteText(identity.uid, out);
+  out.Varint(kManifestFormat);
+  out.Text(identity.uid);
   out.Fixed(absl::ToUnixMicros(identity.create_time));
-  WriteText(identity.request_id, out);
+  out.Text(identity.request_id);
   out.Fixed(identity.fingerprint);
   out.Fixed(static_cast<uint8_t>(settings.durability));
   out.Fixed(static_cast<uint8_t>(settings.duplicates == DuplicatePolicy::kRefuse));
@@ -116,11 +106,11 @@ std::string EncodeIdentity(const SessionIdentity& identity) {
 absl::StatusOr<SessionIdentity> DecodeIdentity(absl::string_view bytes) {
   constexpr absl::string_view kWhat = "the identity of a session is none";
   ByteReader in(bytes);
-  DYNMESH_RETURN_IF_ERROR(CheckFormat(in, kWhat));
+  DYNMESH_RETURN_IF_ERROR(CheckManifestFormat(in, kWhat));
   SessionIdentity identity;
-  identity.uid = ReadText(in);
+  identity.uid = in.Text();
   identity.create_time = absl::FromUnixMicros(in.Fixed<int64_t>());
-  identity.request_id = ReadText(in);
+  identity.request_id = in.Text();
   identity.fingerprint = in.Fixed<uint64_t>();
   if (!ReadSettings(in, identity.settings) || !in.done()) return StoreDamaged(kWhat);
   return identity;

@@ -29,6 +29,7 @@ absl::StatusOr<RecoveredSession> RecoverSession(SessionStore& store, const Limit
     return rebuilder.AddRecord(record.batch);
   };
   DYNMESH_RETURN_IF_ERROR(store.ReadRecords(store.trimmed_revision(), add_record));
+  recovered.changed_pages = rebuilder.changed_pages();
   DYNMESH_ASSIGN_OR_RETURN(recovered.mesh, std::move(rebuilder).Finish());
   return recovered;
 }

@@ -5,6 +5,7 @@
 
 #include "absl/status/statusor.h"
 #include "absl/time/time.h"
+#include "core/archive/dirty_pages.h"
 #include "core/mesh/mesh.h"
 #include "server/session/durability/log_record.h"
 #include "server/session/durability/session_log.h"
@@ -17,6 +18,7 @@ namespace dynmesh {
 struct RecoveredSession {
   Mesh mesh;  ///< without stored relations
   absl::Time commit_time;
+  DirtyPages changed_pages;             ///< since the checkpoint
   std::vector<StoredRecord> records;    ///< that the store holds
   std::vector<LoggedRequest> requests;  ///< that have an id, of the records that are kept; the oldest first
 };

@@ -120,8 +120,9 @@ absl::Status SessionLog::WriteCheckpoint(Reader read) {
   return store_->TrimRecords(TakeSuperfluous(revision));
 }
 
-void SessionLog::NoteStored(const std::vector<StoredRecord>& records) {
+void SessionLog::NoteStored(const std::vector<StoredRecord>& records, const DirtyPages& changed) {
   MutexLock lock(&mu_);
+  dirty_.Add(changed);
   records_.assign(records.begin(), records.end());
   for (const StoredRecord& record : records) record_bytes_ += record.bytes;
 }

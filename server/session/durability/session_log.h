@@ -79,8 +79,9 @@ class SessionLog final : public BatchKeeper {
   /// OK, or why the session takes no more edits until it is opened again.
   absl::Status status() const { return acknowledged_->status(); }
 
-  /// What the store holds already, in order; to be called before anything is appended.
-  void NoteStored(const std::vector<StoredRecord>& records);
+  /// What the store holds already, in order, and which pages its last checkpoint has not as they are; to be
+  /// called before anything is appended.
+  void NoteStored(const std::vector<StoredRecord>& records, const DirtyPages& changed);
 
   /// Makes `mesh`, which no records lead to, what the store holds. Blocks until it is on disk.
   absl::Status StoreAll(const Mesh& mesh, absl::Time commit_time);
