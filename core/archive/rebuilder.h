@@ -87,6 +87,7 @@ class Rebuilder {
   absl::Status LinkEdges();
   absl::Status LinkFaces();
   absl::Status LinkFace(FaceId f, std::vector<uint32_t>& lengths);
+  void PrefetchEdges(FaceId f, const std::vector<uint32_t>& lengths) const;
   absl::Status LinkCells();
   absl::Status LinkCell(CellId c);
   void PrefetchFaces(CellId c) const;
