@@ -51,6 +51,8 @@ class Rebuilder {
   absl::Status AddPage(absl::string_view page);
   /// Records up to the head's revision are passed over; then each must be of the revision after the last.
   absl::Status AddRecord(absl::string_view record);
+  /// The same of a record that the caller has read for its note.
+  absl::Status AddRecord(const RecordView& record);
   /// Of the head, or of the last record.
   int64_t revision() const { return mesh_.revision_; }
   absl::StatusOr<Mesh> Finish() &&;

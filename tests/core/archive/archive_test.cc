@@ -251,6 +251,7 @@ TEST(ArchiveTest, ColumnsThatABatchAddsComeBack) {
 
 TEST(ArchiveTest, ARecordTellsItsNoteAndRevisionWithoutTheMesh) {
   Mesh mesh = OneTet();
+  const Archive before = Archive::Of(mesh);
   RecordEncoder encoder;
   mesh.BeginBatch();
   AddVertices(mesh, 1);
@@ -262,6 +263,12 @@ TEST(ArchiveTest, ARecordTellsItsNoteAndRevisionWithoutTheMesh) {
   EXPECT_EQ(view->note, note);
   EXPECT_EQ(view->revision, mesh.revision());
   EXPECT_TRUE(view->fit == mesh.FitNow());
+  absl::StatusOr<Rebuilder> rebuilder = Rebuilder::Start(before.head);
+  ASSERT_TRUE(rebuilder.ok()) << rebuilder.status();
+  for (const auto& [id, page] : before.pages) ASSERT_TRUE(rebuilder->AddPage(page).ok());
+  ASSERT_TRUE(rebuilder->AddRecord(*view).ok());
+  EXPECT_EQ(rebuilder->revision(), mesh.revision());
+  ExpectIdentical(*std::move(*rebuilder).Finish(), mesh);
 }
 
 TEST(ArchiveTest, RecordsBeforeTheHeadArePassedOver) {
