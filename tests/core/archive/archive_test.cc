@@ -388,6 +388,18 @@ TEST(ArchiveTest, AMeshThatWouldTakeTooMuchMemoryIsRefusedBeforeItDoes) {
   EXPECT_EQ(ErrorReason(status), reason::kLimitExceeded);
 }
 
+TEST(ArchiveTest, RowsOfColumnsCountAgainstTheMemoryLimit) {
+  Mesh mesh = TetGrid(3, 3, 3);
+  const RebuildOptions options = {.max_memory_bytes = 100'000};
+  EXPECT_TRUE(Rebuild(Archive::Of(mesh), 0, options).ok());
+  const AttributeSpec wide{"wide", EntityKind::kCell, AttributeType::kFloat64, 16};
+  ASSERT_TRUE(mesh.AddAttribute(wide).ok());
+  ASSERT_TRUE(mesh.SetAttribute(0, 0, RowOf(std::vector<double>(16, 1.0))).ok());
+  Commit(mesh);
+  EXPECT_EQ(ErrorReason(Rebuild(Archive::Of(mesh), 0, options).status()), reason::kLimitExceeded);
+  EXPECT_TRUE(Rebuild(Archive::Of(mesh)).ok());
+}
+
 TEST(ArchiveTest, PartsOfAnotherMeshAreDataLoss) {
   const Mesh mesh = TetGrid(2, 2, 2), other = HexGrid(2, 2, 2);
   Archive archive = Archive::Of(mesh);
