@@ -1,6 +1,6 @@
 #include "core/archive/column_rows.h"
 
-#include "core/archive/zigzag.h"
+#include "core/archive/row_bytes.h"
 
 namespace dynmesh {
 namespace {

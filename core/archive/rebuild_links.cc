@@ -10,8 +10,8 @@
 namespace dynmesh {
 namespace {
 
-/// How many cells ahead faces are asked for: far enough for memory, near enough for the cache.
-constexpr Slot kFacesAhead = 16;
+/// How many faces or cells ahead their parts are asked for: far enough for memory, near enough for the cache.
+constexpr Slot kAhead = 16;
 
 /// Of a list of incident entities.
 constexpr uint32_t kMaxLength = IncidenceLists<EdgeId>::kMaxLength;
@@ -89,16 +89,29 @@ absl::Status Rebuilder::LinkFaces() {
   const Slot num_faces = Limit(EntityKind::kFace);
   std::vector<uint32_t> lengths(Limit(EntityKind::kEdge));
   for (Slot f = 0; f < num_faces; ++f) {
+    if (f + kAhead < num_faces) PrefetchEdges(FaceId(f + kAhead), lengths);
     if (Lives(FaceId(f))) DYNMESH_RETURN_IF_ERROR(LinkFace(FaceId(f), lengths));
   }
   if (!HaveRoom(lengths)) return LimitExceeded("max_incident_entities", kMaxLength, uint64_t{kMaxLength} + 1);
   mesh_.edge_faces_.Layout(lengths);
   for (Slot f = 0; f < num_faces; ++f) {
+    if (f + kAhead < num_faces && Lives(FaceId(f + kAhead))) {
+      for (EdgeId e : mesh_.Edges(FaceId(f + kAhead))) mesh_.edge_faces_.PrefetchList(e.slot());
+    }
     if (!Lives(FaceId(f))) continue;
     for (EdgeId e : mesh_.Edges(FaceId(f))) mesh_.edge_faces_.Append(e.slot(), FaceId(f));
   }
   mesh_.edge_faces_.IndexLongLists();
   return absl::OkStatus();
+}
+
+void Rebuilder::PrefetchEdges(FaceId f, const std::vector<uint32_t>& lengths) const {
+  if (!Lives(f)) return;
+  for (EdgeId e : mesh_.Edges(f)) {
+    if (e.slot() >= lengths.size()) continue;
+    Prefetch(&mesh_.edge_vertices_[e.slot()]);
+    Prefetch(&lengths[e.slot()]);
+  }
 }
 
 // Edges that join its vertices are live ones, and so are these.
@@ -122,7 +135,7 @@ absl::Status Rebuilder::LinkFace(FaceId f, std::vector<uint32_t>& lengths) {
 absl::Status Rebuilder::LinkCells() {
   const Slot num_cells = Limit(EntityKind::kCell);
   for (Slot c = 0; c < num_cells; ++c) {
-    if (c + kFacesAhead < num_cells) PrefetchFaces(CellId(c + kFacesAhead));
+    if (c + kAhead < num_cells) PrefetchFaces(CellId(c + kAhead));
     if (Lives(CellId(c))) DYNMESH_RETURN_IF_ERROR(LinkCell(CellId(c)));
   }
   return absl::OkStatus();
@@ -132,8 +145,9 @@ void Rebuilder::PrefetchFaces(CellId c) const {
   if (!Lives(c)) return;
   for (OrientedFace oriented : mesh_.Faces(c)) {
     const Slot f = oriented.face().slot();
-    Prefetch(mesh_.face_vertices_.data() + size_t{f} * mesh_.face_stride_);
-    Prefetch(mesh_.face_cells_.data() + f);
+    if (f >= Limit(EntityKind::kFace)) continue;
+    Prefetch(&mesh_.face_vertices_[size_t{f} * mesh_.face_stride_]);
+    Prefetch(&mesh_.face_cells_[f]);
   }
 }
 

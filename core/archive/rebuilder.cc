@@ -120,10 +120,13 @@ bool Rebuilder::ReadPageColumns(EntityKind kind, const Range& range, ByteReader&
 // ---- Records ----
 
 absl::Status Rebuilder::AddRecord(absl::string_view record) {
-  return WithinMemory([&]() -> absl::Status {
-    DYNMESH_ASSIGN_OR_RETURN(const RecordView view, ReadRecord(record));
-    return view.revision <= head_.revision ? absl::OkStatus() : ReadNextRecord(view);
-  });
+  DYNMESH_ASSIGN_OR_RETURN(const RecordView view, ReadRecord(record));
+  return AddRecord(view);
+}
+
+absl::Status Rebuilder::AddRecord(const RecordView& record) {
+  if (record.revision <= head_.revision) return absl::OkStatus();
+  return WithinMemory([&] { return ReadNextRecord(record); });
 }
 
 absl::Status Rebuilder::ReadNextRecord(const RecordView& record) {

@@ -52,6 +52,8 @@ class Rebuilder {
   absl::Status AddPage(absl::string_view page);
   /// Records up to the head's revision are passed over; then each must be of the revision after the last.
   absl::Status AddRecord(absl::string_view record);
+  /// The same of a record that the caller has read for its note.
+  absl::Status AddRecord(const RecordView& record);
   /// Pages that are not as they were added, because of records: what the next checkpoint has to write.
   const DirtyPages& changed_pages() const { return changed_pages_; }
   /// Of the head, or of the last record.
@@ -90,6 +92,7 @@ class Rebuilder {
   absl::Status LinkEdges();
   absl::Status LinkFaces();
   absl::Status LinkFace(FaceId f, std::vector<uint32_t>& lengths);
+  void PrefetchEdges(FaceId f, const std::vector<uint32_t>& lengths) const;
   absl::Status LinkCells();
   absl::Status LinkCell(CellId c);
   void PrefetchFaces(CellId c) const;

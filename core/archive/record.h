@@ -22,8 +22,8 @@ namespace dynmesh {
 ///     mesh.Commit();
 ///
 /// Law: on a mesh that holds what stood before the batch, or parts of what came after it, a record and those
-/// after it lead to the mesh that the last batch left. So it may be replayed twice, and onto pages of
-/// different revisions. Made for many batches: it keeps its lists.
+/// after it lead to the mesh that the last batch left: so pages of different revisions can be brought to one.
+/// Made for many batches: it keeps its lists.
 ///
 /// Cost: linear in the journal, and sorting what it names; some microseconds for a split edge.
 /// Thread safety: that of std::vector.

@@ -1,6 +1,5 @@
 #include "core/archive/slot_rows.h"
 
-#include "core/archive/zigzag.h"
 #include "core/mesh/vector.h"
 
 namespace dynmesh {
@@ -24,9 +23,10 @@ void SlotRowWriter::Write(Slot slot) {
   uint8_t tag = live ? TagOf(id) : 0;
   if (mesh_.slots(kind_).Born(slot) != last_.born) tag |= kTagBorn;
   if (mesh_.changed(kind_).At(slot) != last_.changed) tag |= kTagChanged;
-  out_.Fixed<uint8_t>(tag);
+  row_.Fixed<uint8_t>(tag);
   WriteStamps(slot, tag);
   if (live) WriteContent(id);
+  row_.MoveTo(out_);
 }
 
 uint8_t SlotRowWriter::TagOf(EntityId id) const {
@@ -37,14 +37,14 @@ uint8_t SlotRowWriter::TagOf(EntityId id) const {
 
 void SlotRowWriter::WriteStamps(Slot slot, uint8_t tag) {
   const Stamp born = mesh_.slots(kind_).Born(slot), changed = mesh_.changed(kind_).At(slot);
-  if (tag & kTagBorn) WriteDifference(born, last_.born, out_);
-  if (tag & kTagChanged) WriteDifference(changed, last_.changed, out_);
+  if (tag & kTagBorn) WriteDifference(born, last_.born, row_);
+  if (tag & kTagChanged) WriteDifference(changed, last_.changed, row_);
   last_.born = born;
   last_.changed = changed;
 }
 
 void SlotRowWriter::WriteContent(EntityId id) {
-  if (kind_ == EntityKind::kVertex) return out_.Fixed<Point>(mesh_.Position(VertexId(id.slot)));
+  if (kind_ == EntityKind::kVertex) return row_.Fixed<Point>(mesh_.Position(VertexId(id.slot)));
   WriteSlots(mesh_.VerticesOf(id), last_.vertex, [](VertexId v) { return v.slot(); });
   if (kind_ == EntityKind::kFace) {
     WriteSlots(mesh_.Edges(FaceId(id.slot)), last_.part, [](EdgeId e) { return e.slot(); });
@@ -61,7 +61,7 @@ void SlotRowWriter::WriteSlots(const Items& items, Slot& last, SlotOf slot_of) {
   last = slot_of(items[0]);
   for (const auto& item : items) {
     const Slot slot = slot_of(item);
-    WriteDifference(slot, before, out_);
+    WriteDifference(slot, before, row_);
     before = slot;
   }
 }

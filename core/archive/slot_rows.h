@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 
+#include "core/archive/row_bytes.h"
 #include "core/codec/bytes.h"
 #include "core/mesh/mesh.h"
 
@@ -47,7 +48,7 @@ struct RowContext {
 /// Writes rows of slots of one kind, each against the one before.
 ///
 /// Faces of cells are told without their orientation codes: those follow from the vertices, and change unseen
-/// when a face is turned. Cost: some 100 ns a cell. REQUIRES: the mesh outlives it.
+/// when a face is turned. REQUIRES: the mesh outlives it.
 class SlotRowWriter {
  public:
   SlotRowWriter(const Mesh& mesh, EntityKind kind, const RowContext& start, ByteWriter& out)
@@ -65,6 +66,7 @@ class SlotRowWriter {
   const Mesh& mesh_;
   const EntityKind kind_;
   RowContext last_;
+  RowBuffer row_;
   ByteWriter& out_;
 };
 

@@ -68,6 +68,7 @@ class ByteReader {
   }
 
   uint64_t Varint() {
+    if (ok_ && next_ != end_ && static_cast<uint8_t>(*next_) < 0x80) return static_cast<uint8_t>(*next_++);
     uint64_t value = 0;
     for (int shift = 0; shift < 7 * kMaxVarintBytes && Require(1); shift += 7) {
       const uint64_t byte = static_cast<uint8_t>(*next_++);

@@ -47,8 +47,15 @@ grpc::ServerUnaryReactor* RunUnary(const char* rpc, grpc::CallbackServerContext*
   return reactor;
 }
 
-/// Runs fn(session, grant) when it is its turn at the session of that name, then end(session, revision,
-/// status), which finishes the reactor; `revision` is that of the session before others got their turn.
+/// How a call in turn ended.
+struct TurnEnd {
+  grpc::ServerUnaryReactor* reactor;  ///< to be finished
+  SessionPtr session;
+  int64_t revision;  ///< of the session before others got their turn
+  absl::Status status;
+};
+
+/// Runs fn(session, grant) when it is its turn at the session of that name, then end(TurnEnd).
 template <typename Fn, typename End>
 grpc::ServerUnaryReactor* RunInTurn(const UnaryCall& call, const std::string& session_name,
                                     const SessionWork& work, Fn fn, End end) {
@@ -56,13 +63,13 @@ grpc::ServerUnaryReactor* RunInTurn(const UnaryCall& call, const std::string& se
   const absl::StatusOr<SessionPtr> session = call.services.registry.Find(session_name);
   absl::Status posted = session.status();
   if (session.ok()) {
-    auto task = [call, session = *session, fn = std::move(fn), end](AccessGrant grant) mutable {
+    auto task = [call, reactor, session = *session, fn = std::move(fn), end](AccessGrant grant) mutable {
       const absl::Status stopped = CallStop(call.context).Check();
       const absl::Status status =
           stopped.ok() ? CatchExceptions([&] { return fn(session, std::move(grant)); }) : stopped;
-      const int64_t revision = session->revision();
+      TurnEnd ended{reactor, session, session->revision(), status};
       grant.Release();
-      end(session, revision, status);
+      end(std::move(ended));
     };
     posted = PostWork(call.services, *session, work, std::move(task));
   }
@@ -74,9 +81,8 @@ grpc::ServerUnaryReactor* RunInTurn(const UnaryCall& call, const std::string& se
 template <typename Fn>
 grpc::ServerUnaryReactor* RunOnSession(const UnaryCall& call, const std::string& session_name,
                                        const SessionWork& work, Fn fn) {
-  const auto end = [call, reactor = call.context->DefaultReactor()](const SessionPtr&, int64_t,
-                                                                    const absl::Status& status) {
-    reactor->Finish(LoggedStatus(call.rpc, status));
+  const auto end = [rpc = call.rpc](const TurnEnd& ended) {
+    ended.reactor->Finish(LoggedStatus(rpc, ended.status));
   };
   return RunInTurn(call, session_name, work, std::move(fn), end);
 }
@@ -86,12 +92,12 @@ grpc::ServerUnaryReactor* RunOnSession(const UnaryCall& call, const std::string&
 template <typename Response, typename Fn>
 grpc::ServerUnaryReactor* RunEdit(const UnaryCall& call, const std::string& session_name,
                                   const SessionWork& work, Response* response, Fn fn) {
-  const auto end = [call, response, reactor = call.context->DefaultReactor()](
-                       const SessionPtr& session, int64_t revision, const absl::Status& status) {
-    if (!status.ok()) return reactor->Finish(LoggedStatus(call.rpc, status));
-    session->AwaitAcknowledged(revision, [=](const absl::Status& acknowledged) {
-      response->set_durable_revision(session->durable_revision());
-      reactor->Finish(LoggedStatus(call.rpc, acknowledged));
+  const auto end = [rpc = call.rpc, response](const TurnEnd& ended) {
+    if (!ended.status.ok()) return ended.reactor->Finish(LoggedStatus(rpc, ended.status));
+    const SessionPtr& session = ended.session;
+    session->AwaitAcknowledged(ended.revision, [rpc, response, ended](const absl::Status& acknowledged) {
+      response->set_durable_revision(ended.session->durable_revision());
+      ended.reactor->Finish(LoggedStatus(rpc, acknowledged));
     });
   };
   return RunInTurn(call, session_name, work, std::move(fn), end);

@@ -109,7 +109,8 @@ absl::Status CheckSessionName(absl::string_view name) {
   const bool known_characters = std::all_of(name.begin(), name.end(), [](unsigned char c) {
     return absl::ascii_isalnum(c) || c == '_' || c == '.' || c == '-';
   });
-  if (!name.empty() && name.size() <= kMaxSessionNameBytes && known_characters && absl::ascii_isalnum(name[0])) {
+  if (!name.empty() && name.size() <= kMaxSessionNameBytes && known_characters &&
+      absl::ascii_isalnum(name[0])) {
     return absl::OkStatus();
   }
   return InvalidArgument(
@@ -194,7 +195,7 @@ absl::StatusOr<Session::AnswerPtr> Session::Apply(absl::Span<const Edit> edits, 
   absl::StatusOr<AnswerPtr> answer;
   {
     WriterMutexLock lock(&mu_);
-    DYNMESH_RETURN_IF_ERROR(gone_);
+    DYNMESH_RETURN_IF_ERROR(CheckEditable());
     answer = once ? ApplyOnce(edits, options, fingerprint, stop) : ApplyLocked(edits, options, 0, stop);
   }
   if (revision() != revision_before) WakeFollowers();
@@ -281,7 +282,7 @@ absl::Status Session::EditMesh(absl::FunctionRef<absl::StatusOr<BatchEnding>(Mes
   BatchEnding ending;
   {
     WriterMutexLock lock(&mu_);
-    DYNMESH_RETURN_IF_ERROR(gone_);
+    DYNMESH_RETURN_IF_ERROR(CheckEditable());
     DYNMESH_ASSIGN_OR_RETURN(ending, EditLocked(edit));
     const LoggedRequest request = ended(mesh_);
     if (ending == BatchEnding::kCommit) Log([&] { return request; });
@@ -309,6 +310,11 @@ absl::StatusOr<BatchEnding> Session::EditLocked(absl::FunctionRef<absl::StatusOr
   Committed();
   MakeRoom(mesh_.memory_bytes());
   return wanted;
+}
+
+absl::Status Session::CheckEditable() const {
+  DYNMESH_RETURN_IF_ERROR(gone_);
+  return stores_import_ ? SessionLoading(name()) : absl::OkStatus();
 }
 
 absl::Status Session::CheckRevisions(const ApplyOptions& options) const {
@@ -395,18 +401,26 @@ absl::Status Session::CheckEmpty() const {
 }
 
 absl::Status Session::Adopt(Mesh& mesh) {
+  DYNMESH_RETURN_IF_ERROR(CheckEmpty());  // else the lock may be busy for long
+  if (log_ != nullptr) DYNMESH_RETURN_IF_ERROR(StoreImport(mesh));
   {
-    DYNMESH_RETURN_IF_ERROR(CheckEmpty());  // else the lock may be busy for long
-    if (log_ != nullptr) DYNMESH_RETURN_IF_ERROR(StoreImport(mesh));
     WriterMutexLock lock(&mu_);
-    DYNMESH_RETURN_IF_ERROR(gone_);
-    DYNMESH_RETURN_IF_ERROR(CheckEmpty());
-    DYNMESH_RETURN_IF_ERROR(StoreJust(mesh, StoredRelationsOf(mesh_), limits().max_session_bytes));
-    MakeRoom(mesh.memory_bytes());
-    std::swap(mesh_, mesh);
-    Committed();
+    const absl::Status adopted = AdoptLocked(mesh);
+    if (!adopted.ok() && stores_import_) log_->Fail(adopted);  // the store has what this has not
+    stores_import_ = false;
+    if (!adopted.ok()) return adopted;
   }
   followers_->Wake();  // an import is on disk before it is seen
+  return absl::OkStatus();
+}
+
+absl::Status Session::AdoptLocked(Mesh& mesh) {
+  DYNMESH_RETURN_IF_ERROR(gone_);
+  DYNMESH_RETURN_IF_ERROR(CheckEmpty());
+  DYNMESH_RETURN_IF_ERROR(StoreJust(mesh, StoredRelationsOf(mesh_), limits().max_session_bytes));
+  MakeRoom(mesh.memory_bytes());
+  std::swap(mesh_, mesh);
+  Committed();
   return absl::OkStatus();
 }
 

@@ -269,6 +269,8 @@ class Session : public std::enable_shared_from_this<Session> {
   using AnswerPtr = std::shared_ptr<const BatchResult>;
   using HistoryAnswerPtr = std::shared_ptr<const HistoryResult>;
 
+  /// OK unless nobody may edit: it is gone, or an import is being stored.
+  absl::Status CheckEditable() const ABSL_SHARED_LOCKS_REQUIRED(mu_);
   std::string EtagAt(int64_t revision) const;
   absl::Status CheckEtag(absl::string_view etag) const ABSL_SHARED_LOCKS_REQUIRED(mu_);
   absl::Status CheckRevisions(const ApplyOptions& options) const ABSL_SHARED_LOCKS_REQUIRED(mu_);
@@ -297,6 +299,7 @@ class Session : public std::enable_shared_from_this<Session> {
   /// An index can be made again: it goes when the mesh needs its room, and what undoes batches goes next.
   void MakeRoom(uint64_t mesh_bytes) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
   AnswerPtr Unchanged() const ABSL_SHARED_LOCKS_REQUIRED(mu_);
+  absl::Status AdoptLocked(Mesh& mesh) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
   void Committed() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
   /// Those who follow are told of what is committed, at once or when it is durable.
   void WakeFollowers();
@@ -310,6 +313,7 @@ class Session : public std::enable_shared_from_this<Session> {
   void Log(absl::FunctionRef<LoggedRequest()> request) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
   void StartCheckpoint();
   void WriteCheckpoint();
+  /// Stores what is to be adopted. After success nobody else edits until that is done.
   absl::Status StoreImport(const Mesh& mesh) ABSL_LOCKS_EXCLUDED(mu_);
   absl::Status StoreIdentity() ABSL_LOCKS_EXCLUDED(mu_);
 
@@ -326,6 +330,7 @@ class Session : public std::enable_shared_from_this<Session> {
   Mesh mesh_ ABSL_GUARDED_BY(mu_);
   absl::Time commit_time_ ABSL_GUARDED_BY(mu_);
   absl::Status gone_ ABSL_GUARDED_BY(mu_);  ///< not OK: deleted, damaged by a failure half way, not loaded
+  bool stores_import_ ABSL_GUARDED_BY(mu_) = false;
   uint64_t items_since_check_ ABSL_GUARDED_BY(mu_) = 0;
   AnswerMemory<BatchResult> answers_ ABSL_GUARDED_BY(mu_);
   History history_ ABSL_GUARDED_BY(mu_);

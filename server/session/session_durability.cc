@@ -151,18 +151,18 @@ void Session::WriteCheckpoint() {
 
 // ---- What is stored beside batches ----
 
-/// Nobody edits while this goes on: edits would be no part of what is stored.
+// Edits meanwhile would be no part of what is stored.
 absl::Status Session::StoreImport(const Mesh& mesh) {
   {
     WriterMutexLock lock(&mu_);
-    DYNMESH_RETURN_IF_ERROR(gone_);
+    DYNMESH_RETURN_IF_ERROR(CheckEditable());
     DYNMESH_RETURN_IF_ERROR(CheckEmpty());
-    gone_ = SessionLoading(name());
+    stores_import_ = true;
   }
   const absl::Status stored = CatchExceptions([&] { return log_->StoreAll(mesh, absl::Now()); });
+  if (stored.ok()) return stored;
   WriterMutexLock lock(&mu_);
-  if (!absl::IsUnavailable(gone_)) return gone_;
-  gone_ = absl::OkStatus();
+  stores_import_ = false;
   return stored;
 }
 

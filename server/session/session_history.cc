@@ -37,7 +37,7 @@ absl::StatusOr<Session::HistoryAnswerPtr> Session::MoveInHistory(HistoryMove mov
   absl::StatusOr<HistoryAnswerPtr> answer;
   {
     WriterMutexLock lock(&mu_);
-    DYNMESH_RETURN_IF_ERROR(gone_);
+    DYNMESH_RETURN_IF_ERROR(CheckEditable());
     const bool once = !options.request_id.empty() && !options.validate_only;
     answer = once ? MoveOnce(move, options, stop) : MoveLocked(move, options, 0, stop);
   }

@@ -51,12 +51,13 @@ std::vector<Point> SomePoints(int n) {
 
 PatientContext::PatientContext() { set_deadline(absl::ToChronoTime(absl::Now() + kPatience)); }
 
-void ServerTest::StartServer(const Limits& limits) {
+void ServerTest::StartServer(const Limits& limits, const std::string& data_dir) {
   spdlog::set_level(spdlog::level::err);
   server_ = nullptr;
   ServerOptions options;
   options.listen = {"127.0.0.1:0"};
   options.limits = limits;
+  options.data_dir = data_dir;
   auto started = Server::Start(options);
   ASSERT_TRUE(started.ok()) << started.status();
   server_ = *std::move(started);

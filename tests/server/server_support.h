@@ -61,7 +61,7 @@ class ServerTest : public ::testing::Test {
   ServerTest() { StartServer({}); }
 
   /// Replaces the server by a new one.
-  void StartServer(const Limits& limits);
+  void StartServer(const Limits& limits, const std::string& data_dir = "");
   Server& server() { return *server_; }
   const std::string& address() const { return server_->addresses()[0]; }
   /// A channel that shares no connection with others.

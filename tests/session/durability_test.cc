@@ -285,7 +285,8 @@ TEST_F(DurabilityTest, ADamagedSessionIsSetAsideAndOthersServe) {
     ASSERT_TRUE((*store->OpenSession("bad"))->PutValue(kIdentityName, std::string("\x01", 1)).ok());
     auto records = *store->OpenSession("worse");
     std::promise<absl::Status> done;
-    records->Append({1, std::string("\x01", 1)}, Durability::kSync, [&](const absl::Status& s) { done.set_value(s); });
+    records->Append({1, std::string("\x01", 1)}, Durability::kSync,
+                    [&](const absl::Status& s) { done.set_value(s); });
     ASSERT_TRUE(done.get_future().get().ok());
   }
   Restart();

@@ -220,7 +220,7 @@ TEST_F(HistoryTest, EditsThatAreNoListOfEditsAreUndoneToo) {
           DYNMESH_RETURN_IF_ERROR(mesh.RemoveElement(CellId(0)));
           return ending;
         },
-        [](const Mesh&) {});
+        [](const Mesh&) { return LoggedRequest{}; });
   };
   ASSERT_TRUE(edit(BatchEnding::kRollBack).ok());
   EXPECT_EQ(session->Info()->undoable_batches, 1u);

@@ -251,6 +251,7 @@ TEST(ArchiveTest, ColumnsThatABatchAddsComeBack) {
 
 TEST(ArchiveTest, ARecordTellsItsNoteAndRevisionWithoutTheMesh) {
   Mesh mesh = OneTet();
+  const Archive before = Archive::Of(mesh);
   RecordEncoder encoder;
   mesh.BeginBatch();
   AddVertices(mesh, 1);
@@ -262,6 +263,12 @@ TEST(ArchiveTest, ARecordTellsItsNoteAndRevisionWithoutTheMesh) {
   EXPECT_EQ(view->note, note);
   EXPECT_EQ(view->revision, mesh.revision());
   EXPECT_TRUE(view->fit == mesh.FitNow());
+  absl::StatusOr<Rebuilder> rebuilder = Rebuilder::Start(before.head);
+  ASSERT_TRUE(rebuilder.ok()) << rebuilder.status();
+  for (const auto& [id, page] : before.pages) ASSERT_TRUE(rebuilder->AddPage(page).ok());
+  ASSERT_TRUE(rebuilder->AddRecord(*view).ok());
+  EXPECT_EQ(rebuilder->revision(), mesh.revision());
+  ExpectIdentical(*std::move(*rebuilder).Finish(), mesh);
 }
 
 TEST(ArchiveTest, RecordsBeforeTheHeadArePassedOver) {
@@ -379,6 +386,18 @@ TEST(ArchiveTest, AMeshThatWouldTakeTooMuchMemoryIsRefusedBeforeItDoes) {
   const absl::Status status = Rebuild(Archive::Of(mesh), 0, {.max_memory_bytes = 1000}).status();
   EXPECT_EQ(status.code(), absl::StatusCode::kResourceExhausted);
   EXPECT_EQ(ErrorReason(status), reason::kLimitExceeded);
+}
+
+TEST(ArchiveTest, RowsOfColumnsCountAgainstTheMemoryLimit) {
+  Mesh mesh = TetGrid(3, 3, 3);
+  const RebuildOptions options = {.max_memory_bytes = 100'000};
+  EXPECT_TRUE(Rebuild(Archive::Of(mesh), 0, options).ok());
+  const AttributeSpec wide{"wide", EntityKind::kCell, AttributeType::kFloat64, 16};
+  ASSERT_TRUE(mesh.AddAttribute(wide).ok());
+  ASSERT_TRUE(mesh.SetAttribute(0, 0, RowOf(std::vector<double>(16, 1.0))).ok());
+  Commit(mesh);
+  EXPECT_EQ(ErrorReason(Rebuild(Archive::Of(mesh), 0, options).status()), reason::kLimitExceeded);
+  EXPECT_TRUE(Rebuild(Archive::Of(mesh)).ok());
 }
 
 TEST(ArchiveTest, PartsOfAnotherMeshAreDataLoss) {

@@ -132,6 +132,23 @@ TEST(SlotsTest, RoomCountsFreeSlotsAndTheLimit) {
   EXPECT_TRUE(slots.CanAllocate(3, 5));
 }
 
+TEST(SlotsTest, SlotsThatArePutAreAsTheyWereAndDeadOnesAreFree) {
+  Slots slots;
+  slots.PutLive(5, 7);
+  slots.PutDead(0, 3);
+  for (Slot slot : {1, 2, 3, 4}) slots.PutLive(slot, 2);
+  slots.PutDead(3, 9);
+  slots.FreeDead();
+  EXPECT_TRUE(slots.IsSound());
+  EXPECT_EQ(slots.limit(), 6u);
+  EXPECT_EQ(slots.num_live(), 4u);
+  EXPECT_EQ(slots.Born(5), 7u);
+  EXPECT_EQ(slots.Born(3), 9u);
+  EXPECT_EQ(slots.Allocate(10).slot, 0u);
+  EXPECT_EQ(slots.Allocate(10).slot, 3u);
+  EXPECT_EQ(slots.Allocate(10).slot, 6u);
+}
+
 TEST(StampColumnTest, ForEachSinceFindsWhatABruteForceScanFinds) {
   std::mt19937 rng(2);
   StampColumn column;
