@@ -36,9 +36,9 @@ struct CommitterOptions {
 ///     pages ----EnqueueBackground()-> [ background ] --a part-----+
 ///
 /// Each lane keeps its order; a write overtakes those of the background, and no other. Syncs when a write
-/// asks for it, or the oldest one that did not has waited for async_delay. After a write has failed, so do
-/// all later ones (StoreReadOnly): nobody knows any more what is there. Thread safety: full, until the
-/// destructor runs, which writes and syncs what waits.
+/// asks for it, or when the oldest one that did not has waited for async_delay. After a write has failed, so
+/// do all later ones (StoreReadOnly): nobody knows any more what is there.
+/// Thread safety: full, until the destructor runs, which writes and syncs what waits.
 class Committer {
  public:
   using Done = SessionStore::Done;

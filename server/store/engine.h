@@ -52,9 +52,10 @@ class EngineBatch {
 /// An ordered map of byte strings on some medium: what a Store needs of a key-value library.
 ///
 /// Writes are durable in order: what is on disk after a crash is what a first part of them made. What an
-/// engine finds when it is opened is on disk from then on. Errors of all: DATA_LOSS STORE_DAMAGED,
-/// UNAVAILABLE STORE_FAILED; of writes also RESOURCE_EXHAUSTED STORE_FULL. Thread safety: full, except that
-/// one thread at a time writes.
+/// engine finds when it is opened is on disk from then on.
+/// Errors of all: DATA_LOSS STORE_DAMAGED, UNAVAILABLE STORE_FAILED.
+/// Errors of writes: also RESOURCE_EXHAUSTED STORE_FULL.
+/// Thread safety: full, except that one thread at a time writes.
 class Engine {
  public:
   enum class Sync { kNo, kYes };

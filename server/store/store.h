@@ -18,7 +18,7 @@ namespace dynmesh {
 
 /// When an append is acknowledged. Sessions that need neither have no store.
 enum class Durability {
-  kAsync,  ///< once written: survives the process; loss of power takes what the last moments brought
+  kAsync,  ///< once written: survives the process; loss of power takes the last CommitterOptions::async_delay
   kSync,   ///< once it is on disk
 };
 
@@ -40,7 +40,8 @@ using PageKey = uint64_t;
 ///
 /// Pages go to the disk in the background of appends. Those that are neither written nor dropped stay as they
 /// are in the checkpoint before.
-/// Thread safety: one thread at a time.
+/// Errors: those of everything that writes to the SessionStore; of pages that were fenced, by Commit().
+/// Thread safety: one thread at a time. Must not outlive its session.
 class CheckpointWriter {
  public:
   virtual ~CheckpointWriter() = default;
@@ -62,12 +63,13 @@ class CheckpointWriter {
 ///
 /// Recovery: ReadCheckpoint(), then ReadRecords() after its revision.
 ///
-/// Everything that writes Errors: ABORTED FENCED when another owner has opened the session since; NOT_FOUND
-/// SESSION_DELETED; UNAVAILABLE or FAILED_PRECONDITION STORE_FAILED and RESOURCE_EXHAUSTED STORE_FULL: that
-/// write failed or one before it, and the store only reads until it is opened again. Everything that reads
-/// Errors: DATA_LOSS STORE_DAMAGED, naming the session; UNAVAILABLE STORE_FAILED.
-/// Thread safety: full, except that Append() and BeginCheckpoint() are called by one thread at a time. Must
-/// not outlive its store.
+/// Errors of all that writes: ABORTED FENCED when another owner has opened the session since; NOT_FOUND
+/// SESSION_DELETED; UNAVAILABLE STORE_FAILED or RESOURCE_EXHAUSTED STORE_FULL when it failed;
+/// FAILED_PRECONDITION STORE_FAILED or RESOURCE_EXHAUSTED STORE_FULL when one before it failed, for then the
+/// store only reads until it is opened again.
+/// Errors of all that reads: DATA_LOSS STORE_DAMAGED, naming the session; UNAVAILABLE STORE_FAILED.
+/// Thread safety: full, except that one thread at a time calls Append() and BeginCheckpoint(). Must not
+/// outlive its store.
 class SessionStore {
  public:
   /// Called exactly once, on a thread of the store, never from within the call that was given it. Must be

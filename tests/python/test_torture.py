@@ -62,6 +62,17 @@ class KilledDaemon:
         return (self._directory / "log").read_text(errors="replace")[-2000:]
 
 
+def await_serving(session: dynmesh.Session) -> dynmesh.SessionInfo:
+    """What the session is once a connection is made again."""
+    deadline = time.monotonic() + PATIENCE_S
+    while True:
+        try:
+            return session.info()
+        except dynmesh.UnavailableError:
+            assert time.monotonic() < deadline, "it cannot be reached"
+            time.sleep(0.01)
+
+
 class RandomEdit:
     """One batch, the same for whoever makes it."""
 
@@ -181,7 +192,7 @@ def test_nothing_acknowledged_is_lost_and_nothing_is_done_twice(tmp_path, daemon
             assert not thread.is_alive()
             seen = mirror.revision
             killed.start()
-            assert session.info().revision >= seen, "a follower was told of what is gone"
+            assert await_serving(session).revision >= seen, "a follower was told of what is gone"
             writer.check_after_restart(session)
             mirror.wait(writer.revision, PATIENCE_S)
             assert mirror.checksum == reference.info().checksum

@@ -357,7 +357,7 @@ TEST_P(ConformanceTest, AFailureDuringACheckpointLeavesTheOneBefore) {
 }
 
 TEST_P(ConformanceTest, RandomHistoriesAreReadAsTheyWereWritten) {
-  for (int seed = 0; seed < 10; ++seed) {
+  for (int seed = 0; seed < 6; ++seed) {
     SCOPED_TRACE(absl::StrCat("seed ", seed));
     std::mt19937 random(seed);
     const std::unique_ptr<StoreRig> rig = GetParam().second();
@@ -371,7 +371,7 @@ TEST_P(ConformanceTest, RandomHistoriesAreReadAsTheyWereWritten) {
 
 TEST_P(ConformanceTest, AFlippedBitIsFoundOrHarmless) {
   int found = 0;
-  for (int seed = 0; seed < 60; ++seed) {
+  for (int seed = 0; seed < 40; ++seed) {
     SCOPED_TRACE(absl::StrCat("seed ", seed));
     std::mt19937 random(seed);
     const std::unique_ptr<StoreRig> rig = GetParam().second();

@@ -11,7 +11,7 @@ import grpc
 
 from ._calls import Backoff
 from .delta import Delta, decode_delta
-from .errors import DataLossError, DynmeshError, MirrorError, UnavailableError, from_rpc_error
+from .errors import CancelledError, DataLossError, DynmeshError, MirrorError, UnavailableError, from_rpc_error
 from .v1 import subscriptions_pb2
 
 _log = logging.getLogger(__name__)
@@ -125,7 +125,7 @@ class Follower:
         # Another session has the name now, or (with a server that tells no uids) the server has lost revisions.
         if error.reason in ("SESSION_RECREATED", "REVISION_IN_FUTURE"):
             self._start_over(error)
-        elif isinstance(error, UnavailableError):
+        elif isinstance(error, (UnavailableError, CancelledError)):  # nobody here has cancelled it
             _log.info("event=reconnect session=%s cause=%s", self._request.session, error)
             self._sink.reconnecting()
             with self._condition:
