@@ -33,9 +33,8 @@ absl::Status RepairReactor::Post() {
                   [this, session](AccessGrant grant) {
                     absl::Status status = stop_.Check();
                     if (status.ok()) status = CatchExceptions([&] { return Repair(*session); });
-                    const int64_t revision = session->revision();
                     grant.Release();
-                    if (status.ok()) status = session->WaitUntilAcknowledged(revision);
+                    if (status.ok()) status = session->WaitUntilAcknowledged(result_.result().revision());
                     result_.mutable_result()->set_durable_revision(session->durable_revision());
                     EndWith(status);
                   });

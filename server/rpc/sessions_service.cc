@@ -54,6 +54,7 @@ absl::Status UpdateSession(Session& session, const v1::UpdateSessionRequest& req
 /// What is to be told of the sessions is scanned once for each revision: for many entities that takes a
 /// while.
 bool IsLarge(const Session& session) {
+  if (session.state() != SessionState::kLoaded) return true;  // nobody knows
   uint64_t entities = 0;
   for (EntityKind kind : kEntityKinds) entities += session.num_live(kind);
   return entities > kManyEntities;
@@ -188,7 +189,7 @@ class SessionsService final : public v1::SessionService::CallbackService {
   grpc::ServerUnaryReactor* CreateSession(grpc::CallbackServerContext* context,
                                           const v1::CreateSessionRequest* request,
                                           v1::CreateSessionResponse* response) override {
-    return RunUnary("CreateSession", context, services_.quick(),
+    return RunUnary("CreateSession", context, MayWaitForDisk() ? services_.heavy() : services_.quick(),
                     [=, this] { return dynmesh::CreateSession(services_, *request, response); });
   }
 
@@ -222,7 +223,8 @@ class SessionsService final : public v1::SessionService::CallbackService {
   grpc::ServerUnaryReactor* DeleteSession(grpc::CallbackServerContext* context,
                                           const v1::DeleteSessionRequest* request,
                                           v1::DeleteSessionResponse* response) override {
-    return RunOnSession({"DeleteSession", context, services_}, request->name(), {AccessMode::kWrite},
+    return RunOnSession({"DeleteSession", context, services_}, request->name(),
+                        {AccessMode::kWrite, /*heavy=*/MayWaitForDisk()},
                         [this, request, response](const SessionPtr& session, AccessGrant) {
                           return dynmesh::DeleteSession(services_, session, *request, response);
                         });
@@ -249,6 +251,8 @@ class SessionsService final : public v1::SessionService::CallbackService {
   }
 
  private:
+  bool MayWaitForDisk() const { return services_.registry.keeps_sessions(); }
+
   const ServiceContext services_;
 };
 

@@ -183,13 +183,14 @@ void StreamEditsReactor::ApplyOne(const SessionPtr& session, const Request& requ
 }
 
 void StreamEditsReactor::AnswerWhenAcknowledged(const SessionPtr& session, v1::StreamEditsResponse response) {
+  const int64_t revision = response.applied().revision();
   Response* waiting = nullptr;  // stays where it is until it is ready and written
   {
     MutexLock lock(&mu_);
     waiting = &responses_.emplace_back(Response{std::move(response), false});
     ++awaited_;
   }
-  session->AwaitAcknowledged(session->revision(), [this, session, waiting](const absl::Status& status) {
+  session->AwaitAcknowledged(revision, [this, session, waiting](const absl::Status& status) {
     {
       MutexLock lock(&mu_);
       v1::StreamEditsResponse& message = waiting->message;
@@ -201,8 +202,11 @@ void StreamEditsReactor::AnswerWhenAcknowledged(const SessionPtr& session, v1::S
       }
       waiting->ready = true;
       --awaited_;
+      // From here on another thread that pumps may end the call and delete this.
+      if (pumping_) return;
+      pumping_ = true;
     }
-    Pump();
+    PumpOn();
   });
 }
 

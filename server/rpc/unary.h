@@ -51,7 +51,6 @@ grpc::ServerUnaryReactor* RunUnary(const char* rpc, grpc::CallbackServerContext*
 struct TurnEnd {
   grpc::ServerUnaryReactor* reactor;  ///< to be finished
   SessionPtr session;
-  int64_t revision;  ///< of the session before others got their turn
   absl::Status status;
 };
 
@@ -67,9 +66,8 @@ grpc::ServerUnaryReactor* RunInTurn(const UnaryCall& call, const std::string& se
       const absl::Status stopped = CallStop(call.context).Check();
       const absl::Status status =
           stopped.ok() ? CatchExceptions([&] { return fn(session, std::move(grant)); }) : stopped;
-      TurnEnd ended{reactor, session, session->revision(), status};
       grant.Release();
-      end(std::move(ended));
+      end(TurnEnd{reactor, session, status});
     };
     posted = PostWork(call.services, *session, work, std::move(task));
   }
@@ -87,18 +85,19 @@ grpc::ServerUnaryReactor* RunOnSession(const UnaryCall& call, const std::string&
   return RunInTurn(call, session_name, work, std::move(fn), end);
 }
 
-/// The same for a call that edits: it is answered when what it did may be acknowledged. REQUIRES: fn keeps
-/// its turn to write; `response` has a durable_revision.
+/// The same for a call that edits: it is answered when what it did may be acknowledged. REQUIRES:
+/// `response` has the revision that was made and a durable_revision.
 template <typename Response, typename Fn>
 grpc::ServerUnaryReactor* RunEdit(const UnaryCall& call, const std::string& session_name,
                                   const SessionWork& work, Response* response, Fn fn) {
   const auto end = [rpc = call.rpc, response](const TurnEnd& ended) {
     if (!ended.status.ok()) return ended.reactor->Finish(LoggedStatus(rpc, ended.status));
     const SessionPtr& session = ended.session;
-    session->AwaitAcknowledged(ended.revision, [rpc, response, ended](const absl::Status& acknowledged) {
-      response->set_durable_revision(ended.session->durable_revision());
-      ended.reactor->Finish(LoggedStatus(rpc, acknowledged));
-    });
+    session->AwaitAcknowledged(response->revision(),
+                               [rpc, response, ended](const absl::Status& acknowledged) {
+                                 response->set_durable_revision(ended.session->durable_revision());
+                                 ended.reactor->Finish(LoggedStatus(rpc, acknowledged));
+                               });
   };
   return RunInTurn(call, session_name, work, std::move(fn), end);
 }

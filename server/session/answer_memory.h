@@ -44,11 +44,13 @@ class AnswerMemory {
                            {{"field", "request_id"}});
   }
 
-  /// REQUIRES: Find(id) gave nullptr. `answer_bytes` is about the memory that the answer holds.
+  /// In place of what the id got before, if anything. `answer_bytes` is about the memory that the answer
+  /// holds.
   void Remember(const std::string& id, uint64_t fingerprint, AnswerPtr answer, size_t answer_bytes) {
-    entries_.emplace(id, Entry{fingerprint, answer_bytes, std::move(answer)});
-    order_.push_back(id);
-    bytes_ += answer_bytes;
+    const auto [entry, is_new] = entries_.try_emplace(id);
+    if (is_new) order_.push_back(id);
+    bytes_ += answer_bytes - entry->second.bytes;
+    entry->second = Entry{fingerprint, answer_bytes, std::move(answer)};
     while (order_.size() > kRememberedAnswers || (bytes_ > kRememberedAnswerBytes && order_.size() > 1)) {
       Forget();
     }
@@ -56,8 +58,8 @@ class AnswerMemory {
 
  private:
   struct Entry {
-    uint64_t fingerprint;
-    size_t bytes;
+    uint64_t fingerprint = 0;
+    size_t bytes = 0;
     AnswerPtr answer;
   };
 

@@ -64,7 +64,6 @@ absl::StatusOr<SessionInfo> SessionRegistry::CreateOnce(const Creation& creation
                       sizeof(info));
   }
   MutexLock lock(&mu_);
-  if (draining_) return ShuttingDown();
   sessions_[creation.name] = session;
   spdlog::info("session_created name={} sessions={}", creation.name, sessions_.size());
   return info;
@@ -87,11 +86,17 @@ absl::StatusOr<SessionPtr> SessionRegistry::MakeSession(const Creation& creation
   if (store_ == nullptr) return NoStore();
   SessionIdentity identity{Session::NewUid(), absl::Now(), creation.settings, creation.request_id,
                            creation.fingerprint};
-  DYNMESH_ASSIGN_OR_RETURN(std::unique_ptr<SessionLog> log, MakeLog(creation.name, identity));
+  absl::StatusOr<std::unique_ptr<SessionLog>> log = MakeLog(creation.name, identity);
+  if (!log.ok()) {
+    if (!absl::IsAlreadyExists(log.status())) store_->DeleteSession(creation.name).IgnoreError();
+    return log.status();
+  }
   Session::Options kept = options;
   kept.uid = identity.uid;
   kept.create_time = identity.create_time;
-  return std::make_shared<Session>(kept, std::move(log));
+  kept.create_request_id = creation.request_id;
+  kept.create_fingerprint = creation.fingerprint;
+  return std::make_shared<Session>(kept, *std::move(log));
 }
 
 /// The identity comes last: a session without one was never created.
@@ -146,6 +151,8 @@ absl::StatusOr<SessionPtr> SessionRegistry::OpenStored(const std::string& name) 
   Session::Options options{name, identity.settings, limits_, workers_};
   options.uid = identity.uid;
   options.create_time = identity.create_time;
+  options.create_request_id = identity.request_id;
+  options.create_fingerprint = identity.fingerprint;
   SessionPtr session = std::make_shared<Session>(
       options, LogFor(std::move(store), identity.settings.durability), Session::Content::kStored);
   if (!identity.request_id.empty()) {
@@ -186,13 +193,11 @@ absl::StatusOr<int64_t> SessionRegistry::Delete(absl::string_view name, absl::st
 
 absl::StatusOr<int64_t> SessionRegistry::Delete(const SessionPtr& session, absl::string_view etag) {
   DYNMESH_ASSIGN_OR_RETURN(const int64_t revision, session->Delete(etag));
-  const bool is_stored = session->is_stored();
-  const absl::Status deleted = is_stored ? store_->DeleteSession(session->name()) : absl::OkStatus();
+  if (session->is_stored()) DYNMESH_RETURN_IF_ERROR(store_->DeleteSession(session->name()));
   MutexLock lock(&mu_);
   sessions_.erase(session->name());
   spdlog::info("session_deleted name={} revision={} sessions={}", session->name(), revision,
                sessions_.size());
-  if (!deleted.ok()) return deleted;
   return revision;
 }
 

@@ -67,6 +67,8 @@ class SessionRegistry {
   /// Ends all subscriptions with UNAVAILABLE SHUTTING_DOWN, and refuses new ones and new sessions.
   void Drain();
 
+  /// Whether creating and deleting sessions may wait for the disk.
+  bool keeps_sessions() const { return store_ != nullptr; }
   ImportGate& import_gate() { return import_gate_; }
   /// Of answers that are gathered and wait to be read (max_answer_bytes).
   const std::shared_ptr<Budget>& answer_budget() const { return answer_budget_; }

@@ -274,6 +274,7 @@ absl::Status Session::RunEdit(absl::FunctionRef<absl::Status()> fn) {
   if (returned) return status;
   spdlog::error("session_damaged name={} error=\"{}\"", name(), status.ToString());
   gone_ = SessionDamaged(name());
+  state_ = SessionState::kDamaged;
   return gone_;
 }
 
@@ -284,8 +285,11 @@ absl::Status Session::EditMesh(absl::FunctionRef<absl::StatusOr<BatchEnding>(Mes
     WriterMutexLock lock(&mu_);
     DYNMESH_RETURN_IF_ERROR(CheckEditable());
     DYNMESH_ASSIGN_OR_RETURN(ending, EditLocked(edit));
-    const LoggedRequest request = ended(mesh_);
-    if (ending == BatchEnding::kCommit) Log([&] { return request; });
+    if (ending == BatchEnding::kCommit && log_ != nullptr) {
+      Log([&] { return ended(mesh_); });
+    } else {
+      ended(mesh_);
+    }
   }
   if (ending == BatchEnding::kCommit) WakeFollowers();
   return absl::OkStatus();
@@ -381,7 +385,7 @@ void Session::Committed() {
 absl::Status Session::Update(const SettingsUpdate& update, absl::string_view etag, const StopSignal& stop) {
   {
     WriterMutexLock lock(&mu_);
-    DYNMESH_RETURN_IF_ERROR(gone_);
+    DYNMESH_RETURN_IF_ERROR(CheckEditable());
     DYNMESH_RETURN_IF_ERROR(CheckEtag(etag));
     if (update.stored_relations.has_value()) {
       DYNMESH_RETURN_IF_ERROR(StoreJust(mesh_, *update.stored_relations, limits().max_session_bytes, stop));
@@ -405,7 +409,8 @@ absl::Status Session::Adopt(Mesh& mesh) {
   if (log_ != nullptr) DYNMESH_RETURN_IF_ERROR(StoreImport(mesh));
   {
     WriterMutexLock lock(&mu_);
-    const absl::Status adopted = AdoptLocked(mesh);
+    const absl::Status adopted =
+        CatchExceptions([&]() ABSL_NO_THREAD_SAFETY_ANALYSIS { return AdoptLocked(mesh); });
     if (!adopted.ok() && stores_import_) log_->Fail(adopted);  // the store has what this has not
     stores_import_ = false;
     if (!adopted.ok()) return adopted;

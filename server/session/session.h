@@ -4,6 +4,7 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
+#include <deque>
 #include <memory>
 #include <string>
 #include <vector>
@@ -109,6 +110,9 @@ class Session : public std::enable_shared_from_this<Session> {
     Workers workers;
     std::string uid = {};  ///< empty: a new one
     absl::Time create_time = absl::Now();
+    // Of the request that created it, which its log's store remembers.
+    std::string create_request_id = {};
+    uint64_t create_fingerprint = 0;
     absl::Status damage = absl::OkStatus();  ///< why what is stored cannot be had, if so
   };
 
@@ -295,6 +299,9 @@ class Session : public std::enable_shared_from_this<Session> {
   absl::StatusOr<bool> CheckMemory(absl::Span<const Edit> edits) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
   /// Keeps what undoes the batch that was just committed. Where memory runs out all is forgotten.
   void Remember(absl::optional<BatchImage> image) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
+  /// Batches were undone or redone. Where memory runs out all is forgotten.
+  void Moved(HistoryMove move, uint32_t count, std::deque<BatchImage> images)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
   void CountHistory() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
   /// An index can be made again: it goes when the mesh needs its room, and what undoes batches goes next.
   void MakeRoom(uint64_t mesh_bytes) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
@@ -306,6 +313,7 @@ class Session : public std::enable_shared_from_this<Session> {
 
   // session_durability.cc
   void Load();
+  void StoreRelationsAgain(Mesh& mesh) const;
   absl::Status LoadLocked(RecoveredSession& recovered) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
   absl::Status RememberAgain(const LoggedRequest& request) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
   /// Sends the batch that was just committed to the log, if there is one. What fails there is told to those
@@ -324,6 +332,7 @@ class Session : public std::enable_shared_from_this<Session> {
   const std::unique_ptr<SessionLog> log_;
   std::atomic<SessionState> state_{SessionState::kLoaded};
   std::atomic<bool> load_begun_{true};
+  std::atomic<bool> load_failed_{false};
   std::atomic<bool> writes_checkpoint_{false};
 
   mutable SharedMutex mu_;

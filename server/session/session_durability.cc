@@ -19,9 +19,6 @@ template <typename Answer>
 absl::Status RememberIn(AnswerMemory<Answer>& memory, const LoggedRequest& request,
                         absl::StatusOr<Answer> answer) {
   if (!answer.ok()) return answer.status();
-  const absl::StatusOr<std::shared_ptr<const Answer>> known =
-      memory.Find(request.request_id, request.fingerprint);
-  if (known.ok() && *known != nullptr) return absl::OkStatus();
   memory.Remember(request.request_id, request.fingerprint, std::make_shared<const Answer>(*std::move(answer)),
                   request.answer.size());
   return absl::OkStatus();
@@ -33,18 +30,27 @@ absl::Status RememberIn(AnswerMemory<Answer>& memory, const LoggedRequest& reque
 
 void Session::EnsureLoaded() {
   if (load_begun_.exchange(true)) return;
-  access_->Post(AccessMode::kWrite, *workers().heavy,
-                [self = shared_from_this()](AccessGrant) { self->Load(); });
+  if (!load_failed_) {  // its turn comes before that of whoever asks next
+    access_->Post(AccessMode::kWrite, *workers().heavy,
+                  [self = shared_from_this()](AccessGrant) { self->Load(); });
+    return;
+  }
+  // Others may hold threads while they wait for their turn: with a turn and no thread it would wait for them.
+  workers().heavy->Post([self = shared_from_this()] {
+    const AccessGrant turn = self->access().Acquire(AccessMode::kWrite);
+    self->Load();
+  });
 }
 
 void Session::Load() {
   absl::StatusOr<RecoveredSession> recovered;
   const absl::Status read = CatchExceptions([&] {
     recovered = RecoverSession(log_->store(), limits());
+    if (recovered.ok()) StoreRelationsAgain(recovered->mesh);
     return recovered.status();
   });
   WriterMutexLock lock(&mu_);
-  if (!absl::IsUnavailable(gone_)) return;  // deleted meanwhile
+  if (absl::IsNotFound(gone_)) return;  // deleted meanwhile
   const absl::Status loaded =
       read.ok() ? CatchExceptions([&]() ABSL_NO_THREAD_SAFETY_ANALYSIS { return LoadLocked(*recovered); })
                 : read;
@@ -54,20 +60,25 @@ void Session::Load() {
     spdlog::info("session_loaded name={} revision={}", name(), mesh_.revision());
     return;
   }
+  gone_ = loaded;
   // What may be better next time is tried again then; what is damaged stays so.
   if (absl::IsDataLoss(loaded) || absl::IsFailedPrecondition(loaded)) {
-    gone_ = loaded;
     state_ = SessionState::kDamaged;
   } else {
+    load_failed_ = true;
     load_begun_ = false;
   }
   spdlog::error("session_not_loaded name={} error=\"{}\"", name(), loaded.ToString());
 }
 
+/// Without those that it has no room for: answers are the same.
+void Session::StoreRelationsAgain(Mesh& mesh) const {
+  const absl::Status stored = StoreJust(mesh, options_.settings.stored_relations, limits().max_session_bytes);
+  if (!stored.ok()) spdlog::warn("relations_not_stored name={} error=\"{}\"", name(), stored.ToString());
+}
+
 absl::Status Session::LoadLocked(RecoveredSession& recovered) {
-  DYNMESH_RETURN_IF_ERROR(
-      StoreJust(recovered.mesh, options_.settings.stored_relations, limits().max_session_bytes));
-  log_->NoteStored(recovered.records, recovered.changed_pages);
+  log_->NoteStored(recovered.records, recovered.checkpoint_revision, recovered.changed_pages);
   for (const LoggedRequest& request : recovered.requests) DYNMESH_RETURN_IF_ERROR(RememberAgain(request));
   mesh_ = std::move(recovered.mesh);
   Committed();
@@ -102,8 +113,9 @@ SessionInfo Session::Outline() const {
   info.create_time = create_time_;
   info.update_time = create_time_;
   info.etag = EtagAt(info.revision);
+  if (info.state != SessionState::kDamaged) return info;  // nobody holds the lock of a damaged one for long
   ReaderMutexLock lock(&mu_);
-  if (info.state == SessionState::kDamaged) info.state_message = std::string(gone_.message());
+  info.state_message = std::string(gone_.message());
   return info;
 }
 
@@ -134,7 +146,11 @@ void Session::Log(absl::FunctionRef<LoggedRequest()> request) {
 }
 
 void Session::StartCheckpoint() {
-  workers().heavy->Post([self = shared_from_this()] { self->WriteCheckpoint(); });
+  const absl::Status posted = CatchExceptions([&] {
+    workers().heavy->Post([self = shared_from_this()] { self->WriteCheckpoint(); });
+    return absl::OkStatus();
+  });
+  if (!posted.ok()) writes_checkpoint_ = false;
 }
 
 void Session::WriteCheckpoint() {
@@ -168,7 +184,8 @@ absl::Status Session::StoreImport(const Mesh& mesh) {
 
 absl::Status Session::StoreIdentity() {
   MutexLock lock(&identity_mu_);
-  SessionIdentity identity{uid_, create_time_, options_.settings};
+  SessionIdentity identity{uid_, create_time_, options_.settings, options_.create_request_id,
+                           options_.create_fingerprint};
   identity.settings.checks = checks();
   DYNMESH_RETURN_IF_ERROR(Read([&](const SessionView& view) {
     identity.settings.stored_relations = StoredRelationsOf(view.mesh);

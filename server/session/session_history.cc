@@ -1,14 +1,17 @@
 // Session::MoveInHistory: undoing and redoing batches.
 
+#include <deque>
 #include <memory>
 #include <utility>
 
 #include "core/edit/restore_batches.h"
 #include "core/mesh/error.h"
+#include "server/session/catch_exceptions.h"
 #include "server/session/durability/answer_codec.h"
 #include "server/session/fingerprint.h"
 #include "server/session/mesh_meter.h"
 #include "server/session/session.h"
+#include "spdlog/spdlog.h"
 
 namespace dynmesh {
 namespace {
@@ -73,13 +76,21 @@ absl::StatusOr<Session::HistoryAnswerPtr> Session::MoveLocked(HistoryMove move, 
   if (!edited.ok()) return edited;
   HistoryResult result = {restored->revision, options.count, restored->checksum, restored->counts};
   if (!options.validate_only) {
-    history_.Moved(move, options.count, std::move(restored->images), mesh_.revision());
+    Moved(move, options.count, std::move(restored->images));
     Committed();
   }
   result.undoable_batches = history_.size(HistoryMove::kUndo);
   result.redoable_batches = history_.size(HistoryMove::kRedo);
   if (!options.validate_only) Log([&] { return RequestOf(options, fingerprint, result); });
   return std::make_shared<const HistoryResult>(result);
+}
+
+void Session::Moved(HistoryMove move, uint32_t count, std::deque<BatchImage> images) {
+  const absl::Status moved = CatchExceptions([&]() ABSL_NO_THREAD_SAFETY_ANALYSIS {
+    history_.Moved(move, count, std::move(images), mesh_.revision());
+    return absl::OkStatus();
+  });
+  if (!moved.ok()) spdlog::warn("undo_forgotten name={} error=\"{}\"", name(), moved.ToString());
 }
 
 }  // namespace dynmesh

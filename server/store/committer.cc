@@ -133,7 +133,7 @@ absl::Status Committer::Commit(Round& round) {
 
 void Committer::Acknowledge(Round& round) {
   if (round.sync == Engine::Sync::kYes) {
-    for (auto& on_disk : not_on_disk_) on_disk();
+    for (OnDisk& on_disk : not_on_disk_) on_disk(absl::OkStatus());
     not_on_disk_.clear();
     sync_at_.reset();
   }
@@ -145,7 +145,7 @@ void Committer::Acknowledge(Round& round) {
 
 void Committer::SetOnDisk(Write& write, Engine::Sync sync) {
   if (sync == Engine::Sync::kYes) {
-    write.on_disk();
+    write.on_disk(absl::OkStatus());
   } else {
     not_on_disk_.push_back(std::move(write.on_disk));
   }
@@ -156,9 +156,11 @@ void Committer::Fail(Round& round, const absl::Status& status) {
     MutexLock lock(&mu_);
     if (status_.ok()) status_ = StoreReadOnly(status);
   }
+  for (OnDisk& on_disk : not_on_disk_) on_disk(status);
   not_on_disk_.clear();
   sync_at_.reset();
   for (Write& write : round.writes) {
+    if (write.on_disk != nullptr && write.refusal.ok()) write.on_disk(status);
     if (write.done != nullptr) write.done(write.refusal.ok() ? status : write.refusal);
   }
 }

@@ -42,13 +42,16 @@ struct CommitterOptions {
 class Committer {
  public:
   using Done = SessionStore::Done;
+  using OnDisk = absl::AnyInvocable<void(const absl::Status&)>;
 
   struct Write {
     EngineBatch batch;
     Durability durability = Durability::kAsync;
-    absl::AnyInvocable<void()> on_disk;  ///< if not null: when it is on disk, before `done` of a kSync write
-    Done done;                           ///< if not null: when it is acknowledged
-    absl::Status refusal;                ///< if not OK: nothing is written, and `done` gets it in its turn
+    /// If not null: when it is on disk, before `done` of a kSync write; or with the error, when it never will
+    /// be. Not called for a refusal.
+    OnDisk on_disk;
+    Done done;             ///< if not null: when it is acknowledged
+    absl::Status refusal;  ///< if not OK: nothing is written, and `done` gets it in its turn
   };
 
   Committer(Engine* engine, const CommitterOptions& options);
@@ -100,7 +103,7 @@ class Committer {
 
   // The thread's own.
   absl::optional<Clock::time_point> sync_at_;  ///< set while something that was written is not on disk
-  std::vector<absl::AnyInvocable<void()>> not_on_disk_;
+  std::vector<OnDisk> not_on_disk_;
 
   std::thread thread_;
 };

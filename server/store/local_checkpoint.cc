@@ -64,7 +64,9 @@ absl::Status LocalCheckpoint::Commit(std::string manifest) {
   AddManifest(pages, std::move(manifest), batch);
   // Records before a gap are of no use, and the chain of those after it begins here.
   if (revision_ > session_->progress_->last) AddTrim(session_->owned_.id(), revision_, batch);
-  auto on_disk = [progress = session_->progress_, revision = revision_] { progress->SetDurable(revision); };
+  auto on_disk = [progress = session_->progress_, revision = revision_](const absl::Status& status) {
+    progress->SetDurable(revision, status);
+  };
   DYNMESH_RETURN_IF_ERROR(session_->owned_.CommitAfterBackground(std::move(batch), std::move(on_disk)));
   NoteCommitted(std::move(pages));
   return absl::OkStatus();

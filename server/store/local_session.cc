@@ -117,7 +117,9 @@ void LocalSession::Append(Record record, Durability durability, Done done) {
     std::string key = layout::RecordKey(owned_.id(), revision);
     std::string value = layout::Seal(key, layout::WriteRecord({progress_->last, record.bytes}));
     write.batch.Put(std::move(key), std::move(value));
-    write.on_disk = [progress = progress_, revision] { progress->SetDurable(revision); };
+    write.on_disk = [progress = progress_, revision](const absl::Status& status) {
+      progress->SetDurable(revision, status);
+    };
     progress_->last = revision;
   }
   owned_.Enqueue(std::move(write));

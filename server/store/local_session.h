@@ -18,20 +18,24 @@ namespace dynmesh {
 
 /// How far a session has come.
 struct SessionProgress {
-  /// On the committer's thread.
-  void SetDurable(int64_t revision) {
-    if (revision <= durable) return;
-    durable = revision;
-    MutexLock lock(&mu);
-    if (watcher) watcher(revision);
+  /// On the committer's thread: `revision` is on disk, or it never will be.
+  void SetDurable(int64_t revision, const absl::Status& status) {
+    if (status.ok() && revision <= durable) return;
+    if (status.ok()) durable = revision;
+    const std::shared_ptr<SessionStore::Watcher> watching = Watching();
+    if (watching != nullptr) (*watching)(status.ok() ? absl::StatusOr<int64_t>(revision) : status);
   }
   void Watch(SessionStore::Watcher new_watcher) {
     MutexLock lock(&mu);
-    watcher = std::move(new_watcher);
+    watcher = new_watcher ? std::make_shared<SessionStore::Watcher>(std::move(new_watcher)) : nullptr;
+  }
+  std::shared_ptr<SessionStore::Watcher> Watching() {
+    MutexLock lock(&mu);
+    return watcher;
   }
 
-  Mutex mu;  ///< held while the watcher runs
-  SessionStore::Watcher watcher ABSL_GUARDED_BY(mu);
+  Mutex mu;  ///< not held while the watcher runs, which may end the session
+  std::shared_ptr<SessionStore::Watcher> watcher ABSL_GUARDED_BY(mu);
 
   std::atomic<int64_t> last{0};        ///< record or checkpoint
   std::atomic<int64_t> durable{0};     ///< the same, on disk

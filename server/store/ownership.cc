@@ -48,7 +48,7 @@ absl::Status OwnedSession::Commit(EngineBatch batch) const {
 }
 
 absl::Status OwnedSession::CommitAfterBackground(EngineBatch batch,
-                                                 absl::AnyInvocable<void()> on_disk) const {
+                                                 Committer::OnDisk on_disk) const {
   AwaitedWrite write(std::move(batch));
   write.write.on_disk = std::move(on_disk);
   EnqueueBackground(std::move(write.write));

@@ -71,7 +71,7 @@ class OwnedSession {
 
   /// Returns when it is on disk.
   absl::Status Commit(EngineBatch batch) const;
-  absl::Status CommitAfterBackground(EngineBatch batch, absl::AnyInvocable<void()> on_disk) const;
+  absl::Status CommitAfterBackground(EngineBatch batch, Committer::OnDisk on_disk) const;
 
  private:
   std::shared_ptr<const Ownership> ownership_;

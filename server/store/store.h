@@ -75,7 +75,7 @@ class SessionStore {
   /// Called exactly once, on a thread of the store, never from within the call that was given it. Must be
   /// short and must not wait for the store.
   using Done = absl::AnyInvocable<void(const absl::Status&)>;
-  using Watcher = absl::AnyInvocable<void(int64_t durable_revision)>;
+  using Watcher = absl::AnyInvocable<void(const absl::StatusOr<int64_t>& durable_revision)>;
   using RecordFn = absl::FunctionRef<absl::Status(int64_t revision, absl::string_view bytes)>;
   using PageFn = absl::FunctionRef<absl::Status(PageKey page, absl::string_view bytes)>;
 
@@ -89,8 +89,10 @@ class SessionStore {
   virtual int64_t trimmed_revision() const = 0;
   /// The last one that is known to survive a loss of power.
   virtual int64_t durable_revision() const = 0;
-  /// From now on `watcher` is called whenever that has grown, on a thread of the store; null: nobody is. It
-  /// must be short, and must not wait for the store. None runs any more when this or the destructor returns.
+  /// From now on `watcher` is called whenever that has grown, and with an error when what was written will
+  /// never be on disk, on a thread of the store; null: nobody is. It
+  /// must be short, and must not wait for the store. One call may still be under way when this, or the
+  /// destructor, returns.
   virtual void WatchDurable(Watcher watcher) = 0;
 
   /// Acknowledgements come in the order of the calls. A record that was not acknowledged may be found after a

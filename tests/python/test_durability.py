@@ -6,6 +6,7 @@ import dynmesh
 import pytest
 from dynmesh.daemon import find_daemon
 from shapes import two_tets
+from waiting import await_serving
 
 
 def test_a_session_is_there_again_with_its_ids(tmp_path):
@@ -42,6 +43,7 @@ def test_a_mirror_goes_on_across_a_restart(tmp_path):
             mirror = session.mirror(on_delta=lambda update: mirrored.append(update.from_revision))
             mirror.wait(1, 30)
         with dynmesh.launch(data_dir=directory, flags=[socket]):
+            await_serving(session)
             with session.edit() as batch:
                 batch.add_vertices([[9, 9, 9]])
             mirror.wait(2, 30)

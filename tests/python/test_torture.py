@@ -17,10 +17,10 @@ import meshio
 import numpy as np
 import pytest
 from dynmesh.daemon import find_daemon
+from waiting import PATIENCE_S, await_serving
 
 KILLS = int(os.environ.get("DYNMESH_TORTURE_KILLS", "20"))
 SEED = int(os.environ.get("DYNMESH_TORTURE_SEED", "1"))
-PATIENCE_S = 60.0
 CHECKPOINT_BYTES = 30_000  # some dozens of batches: kills fall into checkpoints, too
 
 
@@ -60,17 +60,6 @@ class KilledDaemon:
 
     def log_tail(self) -> str:
         return (self._directory / "log").read_text(errors="replace")[-2000:]
-
-
-def await_serving(session: dynmesh.Session) -> dynmesh.SessionInfo:
-    """What the session is once a connection is made again."""
-    deadline = time.monotonic() + PATIENCE_S
-    while True:
-        try:
-            return session.info()
-        except dynmesh.UnavailableError:
-            assert time.monotonic() < deadline, "it cannot be reached"
-            time.sleep(0.01)
 
 
 class RandomEdit:

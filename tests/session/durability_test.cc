@@ -177,6 +177,7 @@ TEST_F(DurabilityTest, ARetryGetsTheFirstAnswerAfterARestart) {
   const auto repaired = *RepairSession(*session, repair, StopSignal::Never(), [](size_t) {});
   const int64_t revision = session->revision();
   ASSERT_TRUE(WaitFor(*session, revision).ok());
+  ASSERT_TRUE(session->Update({.checks = CheckSettings()}, "").ok());
   Restart();
   EXPECT_EQ(daemon_->registry().Create("mesh", {}, "create")->uid, created->uid);
   const SessionPtr after = Find();
@@ -237,7 +238,8 @@ TEST_F(DurabilityTest, FollowersAreToldOfWhatIsDurableOnly) {
 
 TEST_F(DurabilityTest, WhatCannotBeStoredIsNotAcknowledgedAndEndsEditing) {
   const SessionPtr session = daemon_->NewSession();
-  MustApply(*session, AddTet());
+  const std::vector<Edit> kept = AddTet();
+  MustApply(*session, kept, {.request_id = "kept"});
   ASSERT_TRUE(WaitFor(*session, 1).ok());
   const Mesh mesh = Copy(*session);
   medium_.Hold();
@@ -249,6 +251,8 @@ TEST_F(DurabilityTest, WhatCannotBeStoredIsNotAcknowledgedAndEndsEditing) {
   EXPECT_EQ(session->revision(), 2) << "nothing was added to what may be lost";
   EXPECT_FALSE(WaitFor(*session, MustApply(*session, AddTet(), {.request_id = "lost"})->revision).ok())
       << "a retry is not acknowledged either";
+  EXPECT_TRUE(WaitFor(*session, MustApply(*session, kept, {.request_id = "kept"})->revision).ok())
+      << "what was acknowledged before still is";
   EXPECT_TRUE(session->Info().ok()) << "it can still be read";
   medium_.Fail(absl::OkStatus());
   Restart();
@@ -257,6 +261,24 @@ TEST_F(DurabilityTest, WhatCannotBeStoredIsNotAcknowledgedAndEndsEditing) {
   ExpectIdentical(Copy(*after), mesh);
   MustApply(*after, AddTet(), {.request_id = "lost"});
   EXPECT_TRUE(WaitFor(*after, 2).ok());
+}
+
+TEST_F(DurabilityTest, ADelayedSyncThatFailsIsToldToAllWhoWaitForIt) {
+  const SessionPtr session = daemon_->NewSession("mesh", {.durability = SessionDurability::kAsync});
+  RecordingSink sink(daemon_->workers(), RecordingSink::Acknowledge::kAtOnce);
+  ASSERT_TRUE(sink.Follow(session, {}).ok());
+  medium_.FailSyncs(absl::UnavailableError("the disk is gone"));
+  MustApply(*session, AddTet());
+  EXPECT_TRUE(WaitFor(*session, 1).ok()) << "it was written";
+  std::promise<absl::Status> durable;
+  session->AwaitDurable(1, [&](const absl::Status& status) { durable.set_value(status); });
+  EXPECT_FALSE(durable.get_future().get().ok());
+  EXPECT_FALSE(session->Apply(AddTet(), {}).ok()) << "nothing more is let in";
+  EXPECT_EQ(session->revision(), 1);
+  sink.follower().End(absl::CancelledError("the test is over"));
+  sink.AwaitEnd().IgnoreError();
+  EXPECT_EQ(sink.mirror_revision(), 0) << "nobody was told of what is not on disk";
+  medium_.FailSyncs(absl::OkStatus());
 }
 
 TEST_F(DurabilityTest, AnImportThatCannotBeStoredLeavesTheSessionEmpty) {

@@ -32,6 +32,11 @@ class Medium {
     held_ = false;
     changed_.NotifyAll();
   }
+  /// From now on writes that are to be on disk fail, the delayed ones too; others go on.
+  void FailSyncs(const absl::Status& status) {
+    MutexLock lock(&mu_);
+    sync_failure_ = status;
+  }
   /// From now on all writes fail; OK: no more.
   void Fail(const absl::Status& status) {
     MutexLock lock(&mu_);
@@ -46,7 +51,7 @@ class Medium {
     explicit Connection(Medium& medium) : medium_(medium) {}
 
     absl::Status Write(const EngineBatch& batch, Sync sync) override {
-      const absl::Status admitted = medium_.Admit();
+      const absl::Status admitted = medium_.Admit(sync);
       return admitted.ok() ? medium_.memory_.Write(batch, sync) : admitted;
     }
     absl::StatusOr<absl::optional<std::string>> Get(absl::string_view key) const override {
@@ -64,10 +69,10 @@ class Medium {
     Medium& medium_;
   };
 
-  absl::Status Admit() {
+  absl::Status Admit(Engine::Sync sync) {
     MutexLock lock(&mu_);
     while (held_) changed_.Wait(&mu_);
-    return failure_;
+    return sync == Engine::Sync::kYes && failure_.ok() ? sync_failure_ : failure_;
   }
 
   MemoryEngine memory_;
@@ -75,6 +80,7 @@ class Medium {
   CondVar changed_;
   bool held_ ABSL_GUARDED_BY(mu_) = false;
   absl::Status failure_ ABSL_GUARDED_BY(mu_);
+  absl::Status sync_failure_ ABSL_GUARDED_BY(mu_);
 };
 
 }  // namespace dynmesh::testing

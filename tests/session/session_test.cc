@@ -266,7 +266,8 @@ TEST(FingerprintTest, TellsEditsApart) {
       {RemoveElementsEdit{EntityKind::kCell, {1, 2}}},
       {AddAttributeEdit{spec}},
       {AddAttributeEdit{{"a", EntityKind::kVertex, AttributeType::kInt32, 1, AttributePolicy::kMax}}},
-      {AddAttributeEdit{{"a", EntityKind::kVertex, AttributeType::kInt32, 1, AttributePolicy::kCopy, {1, 0, 0, 0}}}},
+      {AddAttributeEdit{
+          {"a", EntityKind::kVertex, AttributeType::kInt32, 1, AttributePolicy::kCopy, {1, 0, 0, 0}}}},
       {SetAttributeEdit{spec, {1}, {0, 0, 0, 1}}},
   };
   for (size_t i = 0; i < all.size(); ++i) {

@@ -304,7 +304,8 @@ TEST(SpatialIndexBytesTest, AnIndexMakesRoomForEdits) {
   Limits limits;
   limits.max_session_bytes = 2'000'000;
   Daemon daemon(limits);
-  const SessionPtr session = SessionOf(daemon, TetGrid(8, 8, 8));  // an index of cells outweighs 1000 vertices
+  const SessionPtr session =
+      SessionOf(daemon, TetGrid(8, 8, 8));  // an index of cells outweighs 1000 vertices
   for (EntityKind kind : {EntityKind::kVertex, EntityKind::kCell, EntityKind::kFace}) {
     ASSERT_TRUE(QueryInBox(*session, kind, kCorner).ok());
   }

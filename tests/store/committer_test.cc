@@ -130,7 +130,7 @@ TEST(CommitterTest, SyncsAnAsyncWriteInItsTimeThoughNobodyAsks) {
   Acknowledgements acknowledged, on_disk;
   Committer committer(&engine, {.async_delay = absl::Milliseconds(1)});
   Committer::Write write = WriteOf(Durability::kAsync, acknowledged.Of(0));
-  write.on_disk = [done = on_disk.Of(0)]() mutable { done(absl::OkStatus()); };
+  write.on_disk = on_disk.Of(0);
   committer.Enqueue(std::move(write));
   EXPECT_THAT(on_disk.AwaitSuccesses(1), ElementsAre(0));
   EXPECT_TRUE(engine.notes().back().synced);
@@ -142,7 +142,7 @@ TEST(CommitterTest, TellsWhatIsOnDiskBeforeItAcknowledgesASync) {
   Committer committer(&engine, {.async_delay = kNever});
   for (int i = 0; i < 4; i += 2) {
     Committer::Write write = WriteOf(i == 0 ? Durability::kAsync : Durability::kSync, heard.Of(i));
-    write.on_disk = [done = heard.Of(i + 1)]() mutable { done(absl::OkStatus()); };
+    write.on_disk = heard.Of(i + 1);
     committer.Enqueue(std::move(write));
     heard.Await(i == 0 ? 1 : 4);
   }

@@ -18,6 +18,7 @@ namespace dynmesh {
 struct RecoveredSession {
   Mesh mesh;  ///< without stored relations
   absl::Time commit_time;
+  int64_t checkpoint_revision = 0;
   DirtyPages changed_pages;             ///< since the checkpoint
   std::vector<StoredRecord> records;    ///< that the store holds
   std::vector<LoggedRequest> requests;  ///< that have an id, of the records that are kept; the oldest first

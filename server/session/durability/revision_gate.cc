@@ -2,6 +2,9 @@
 
 #include <utility>
 
+#include "server/session/catch_exceptions.h"
+#include "spdlog/spdlog.h"
+
 namespace dynmesh {
 
 void RevisionGate::Wait(int64_t revision, Done done) {
@@ -27,7 +30,7 @@ void RevisionGate::Reach(int64_t revision) {
   Waiting due;
   {
     MutexLock lock(&mu_);
-    if (revision <= reached_) return;
+    if (revision <= reached_ || !status_.ok()) return;
     reached_ = revision;
     changed_.NotifyAll();
     const auto end = waiting_.upper_bound(revision);
@@ -51,7 +54,13 @@ void RevisionGate::Fail(const absl::Status& status) {
 void RevisionGate::Post(Waiting due, const absl::Status& status) {
   if (due.empty()) return;
   executor_->Post([due = std::move(due), status]() mutable {
-    for (auto& [revision, done] : due) done(status);
+    for (auto& [revision, done] : due) {
+      const absl::Status told = CatchExceptions([&done = done, &status] {
+        done(status);
+        return absl::OkStatus();
+      });
+      if (!told.ok()) spdlog::error("acknowledgement_failed error=\"{}\"", told.ToString());
+    }
   });
 }
 

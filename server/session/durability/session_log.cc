@@ -4,16 +4,26 @@
 #include <utility>
 #include <vector>
 
+#include "absl/strings/str_cat.h"
 #include "core/archive/head.h"
 #include "core/archive/page.h"
 #include "core/mesh/error.h"
+#include "server/session/catch_exceptions.h"
 #include "server/session/durability/manifest.h"
+#include "server/store/store_errors.h"
 
 namespace dynmesh {
 namespace {
 
 /// Pages that are encoded before edits get their turn again: about a millisecond.
 constexpr size_t kPagesAtOnce = 32;
+
+/// Leaves room for the request and its answer.
+constexpr size_t kMaxBatchBytes = kMaxStoredBytes / 2;
+
+absl::Status RevisionNotStored(int64_t revision) {
+  return StoreFailed(absl::StrCat("revision ", revision, " was not stored"));
+}
 
 struct EncodedPage {
   PageId id;
@@ -44,8 +54,14 @@ SessionLog::SessionLog(std::unique_ptr<SessionStore> store, const SessionLogOpti
 
 void SessionLog::WatchDurable(absl::AnyInvocable<void()> watcher) {
   const auto shared = std::make_shared<absl::AnyInvocable<void()>>(std::move(watcher));
-  store_->WatchDurable([durable = durable_, executor = executor_, shared](int64_t revision) {
-    durable->Reach(revision);
+  store_->WatchDurable([acknowledged = acknowledged_, durable = durable_, executor = executor_,
+                        shared](const absl::StatusOr<int64_t>& revision) {
+    if (!revision.ok()) {
+      acknowledged->Fail(revision.status());
+      durable->Fail(revision.status());
+      return;
+    }
+    durable->Reach(*revision);
     executor->Post([shared] { (*shared)(); });
   });
 }
@@ -53,12 +69,15 @@ void SessionLog::WatchDurable(absl::AnyInvocable<void()> watcher) {
 absl::Status SessionLog::Keep(const Mesh& mesh) {
   DYNMESH_RETURN_IF_ERROR(status());
   batch_ = encoder_.Encode(mesh, {});
+  if (batch_.size() > kMaxBatchBytes) return LimitExceeded("max_record_bytes", kMaxBatchBytes, batch_.size());
   MutexLock lock(&mu_);
   dirty_.Add(mesh.journal());
   return absl::OkStatus();
 }
 
 void SessionLog::Append(int64_t revision, absl::Time commit_time, const LoggedRequest& request) {
+  // After a gap nobody could read what comes.
+  if (revision != store_->last_revision() + 1) return Fail(RevisionNotStored(store_->last_revision() + 1));
   Record record{revision, EncodeLogRecord({commit_time, request, batch_})};
   bytes_since_checkpoint_ += record.bytes.size();
   {
@@ -101,30 +120,41 @@ absl::Status SessionLog::WriteCheckpoint(Reader read) {
     revision = mesh.revision();
     bytes_since_checkpoint_ = 0;
     MutexLock lock(&mu_);
-    pages = std::exchange(dirty_, {});
+    std::swap(pages, dirty_);  // cannot fail, and comes last
     return absl::OkStatus();
   }));
-  const absl::Status written = [&]() -> absl::Status {
+  const absl::Status written = CatchExceptions([&]() -> absl::Status {
     DYNMESH_ASSIGN_OR_RETURN(const auto writer, store_->BeginCheckpoint(revision));
     int64_t newest = revision;
     DYNMESH_RETURN_IF_ERROR(WritePages(read, pages, *writer, newest));
     // Pages may tell of later revisions than the head: those must not vanish when these stay.
     DYNMESH_RETURN_IF_ERROR(durable_->Await(newest));
     return writer->Commit(EncodeManifest(manifest));
-  }();
+  });
   if (!written.ok()) {
     MutexLock lock(&mu_);
-    dirty_.Add(pages);
+    const absl::Status kept = CatchExceptions([&]() ABSL_NO_THREAD_SAFETY_ANALYSIS {
+      dirty_.Add(pages);
+      return absl::OkStatus();
+    });
+    if (!kept.ok()) Fail(kept);  // a later checkpoint would not know of them
     return written;
   }
   return store_->TrimRecords(TakeSuperfluous(revision));
 }
 
-void SessionLog::NoteStored(const std::vector<StoredRecord>& records, const DirtyPages& changed) {
+void SessionLog::NoteStored(const std::vector<StoredRecord>& records, int64_t checkpoint,
+                            const DirtyPages& changed) {
   MutexLock lock(&mu_);
   dirty_.Add(changed);
   records_.assign(records.begin(), records.end());
-  for (const StoredRecord& record : records) record_bytes_ += record.bytes;
+  record_bytes_ = 0;
+  uint64_t since = 0;
+  for (const StoredRecord& record : records) {
+    record_bytes_ += record.bytes;
+    if (record.revision > checkpoint) since += record.bytes;
+  }
+  bytes_since_checkpoint_ = since;
 }
 
 int64_t SessionLog::TakeSuperfluous(int64_t revision) {

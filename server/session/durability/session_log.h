@@ -62,7 +62,8 @@ class SessionLog final : public BatchKeeper {
   /// Calls `watcher` on a thread of the executor whenever more revisions are durable. Call it once, early.
   void WatchDurable(absl::AnyInvocable<void()> watcher);
 
-  /// Encodes what the open batch did. Errors: those of status().
+  /// Encodes what the open batch did. Errors: those of status(); RESOURCE_EXHAUSTED LIMIT_EXCEEDED
+  /// (max_record_bytes) when that is more than a store takes.
   absl::Status Keep(const Mesh& mesh) override;
   /// The batch kept last is committed: it goes to the store as `revision`.
   void Append(int64_t revision, absl::Time commit_time, const LoggedRequest& request);
@@ -79,9 +80,9 @@ class SessionLog final : public BatchKeeper {
   /// OK, or why the session takes no more edits until it is opened again.
   absl::Status status() const { return acknowledged_->status(); }
 
-  /// What the store holds already, in order, and which pages its last checkpoint has not as they are; to be
-  /// called before anything is appended.
-  void NoteStored(const std::vector<StoredRecord>& records, const DirtyPages& changed);
+  /// What the store holds already: records, in order, the revision of its checkpoint, and the pages that this
+  /// has not as they are. To be called before anything is appended.
+  void NoteStored(const std::vector<StoredRecord>& records, int64_t checkpoint, const DirtyPages& changed);
 
   /// Makes `mesh`, which no records lead to, what the store holds. Blocks until it is on disk.
   absl::Status StoreAll(const Mesh& mesh, absl::Time commit_time);
