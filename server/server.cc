@@ -36,12 +36,14 @@
 namespace dynmesh {
 namespace {
 
-constexpr const char* kServiceNames[] = {"dynmesh.v1.SessionService", "dynmesh.v1.EditService",
-                                         "dynmesh.v1.QueryService",   "dynmesh.v1.CheckService",
-                                         "dynmesh.v1.RepairService",  "dynmesh.v1.AdaptService",
+constexpr const char* kServiceNames[] = {"dynmesh.v1.SessionService",     "dynmesh.v1.EditService",
+                                         "dynmesh.v1.QueryService",       "dynmesh.v1.CheckService",
+                                         "dynmesh.v1.RepairService",      "dynmesh.v1.AdaptService",
                                          "dynmesh.v1.SubscriptionService"};
 // gRPC refuses larger messages before we see them; up to there our own refusal names the limit.
 constexpr uint64_t kHardMessageFactor = 4;
+// Followers, and a daemon that drains, wait for as long.
+constexpr absl::Duration kMaxAsyncDelay = absl::Seconds(10);
 constexpr int kKeepaliveTimeMs = 30'000;
 constexpr int kKeepaliveTimeoutMs = 10'000;
 constexpr int kMinPingIntervalMs = 5'000;
@@ -119,8 +121,9 @@ int HeavyThreads(const ServerOptions& options) {
 /// Null without a directory.
 absl::StatusOr<std::unique_ptr<Store>> OpenStore(const ServerOptions& options) {
   if (options.data_dir.empty()) return std::unique_ptr<Store>();
-  if (options.async_delay < absl::ZeroDuration()) {
-    return InvalidArgument(reason::kBadArgument, "async_delay is negative", {{"field", "async_delay"}});
+  if (options.async_delay < absl::ZeroDuration() || options.async_delay > kMaxAsyncDelay) {
+    return InvalidArgument(reason::kBadArgument, "async_delay is outside 0 to 10 s",
+                           {{"field", "async_delay"}});
   }
   DYNMESH_ASSIGN_OR_RETURN(std::unique_ptr<Engine> engine, OpenRocksDb({options.data_dir}));
   return LocalStore::Open(std::move(engine), {.async_delay = options.async_delay});

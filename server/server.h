@@ -22,7 +22,7 @@ struct ServerOptions {
   bool allow_insecure = false;
   /// Where sessions are kept; empty: they end with the process. Made if it is not there.
   std::string data_dir;
-  /// What a loss of power may take of sessions with DURABILITY_ASYNC.
+  /// What a loss of power may take of sessions with DURABILITY_ASYNC; at most 10 s.
   absl::Duration async_delay = absl::Milliseconds(50);
   /// Records of a session of so many bytes make a checkpoint due, which keeps its loading short.
   uint64_t checkpoint_bytes = uint64_t{64} << 20;

@@ -84,20 +84,28 @@ class ListSessionsCall {
   }
 
   void Visit() {
+    const absl::Status added = CatchExceptions([this] { return AddOutlines(); });
+    if (!added.ok()) return Finish(added);
     if (next_ == sessions_.size()) return Finish(absl::OkStatus());
-    if (next_ == page_size_ || bytes_ > kMaxPageBytes) {
+    if (IsFull()) {
       response_->set_next_page_token(ToPageToken(sessions_[next_ - 1]->name()));
       return Finish(absl::OkStatus());
     }
     const SessionPtr& session = sessions_[next_];
-    if (session->state() != SessionState::kLoaded) {  // nobody has to wait for it to be read
-      Add(session->Outline());
-      ++next_;
-      return Visit();
-    }
     const absl::Status posted = PostWork(call_.services, session, {AccessMode::kRead, IsLarge(*session)},
                                          [this](AccessGrant grant) { Describe(std::move(grant)); });
     if (!posted.ok()) Finish(posted);
+  }
+
+  bool IsFull() const { return next_ == page_size_ || bytes_ > kMaxPageBytes; }
+
+  /// Of the next sessions that are not loaded: nobody has to wait for them to be read.
+  absl::Status AddOutlines() {
+    for (; next_ < sessions_.size() && !IsFull(); ++next_) {
+      if (sessions_[next_]->state() == SessionState::kLoaded) break;
+      Add(sessions_[next_]->Outline());
+    }
+    return absl::OkStatus();
   }
 
   void Add(const SessionInfo& info) {
@@ -109,8 +117,11 @@ class ListSessionsCall {
     const absl::Status stopped = CallStop(call_.context).Check();
     if (!stopped.ok()) return Finish(stopped);
     const absl::Status described = CatchExceptions([this]() -> absl::Status {
-      DYNMESH_ASSIGN_OR_RETURN(const SessionInfo info, sessions_[next_]->Info());
-      Add(info);
+      const Session& session = *sessions_[next_];
+      const absl::StatusOr<SessionInfo> info = session.Info();
+      const bool damaged = !info.ok() && session.state() == SessionState::kDamaged;  // since it was chosen
+      if (!info.ok() && !damaged) return info.status();
+      Add(damaged ? session.Outline() : *info);
       return absl::OkStatus();
     });
     grant.Release();

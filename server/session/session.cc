@@ -14,7 +14,6 @@
 #include "core/mesh/error.h"
 #include "server/session/catch_exceptions.h"
 #include "server/session/durability/answer_codec.h"
-#include "server/session/durability/recover.h"
 #include "server/session/fingerprint.h"
 #include "server/session/mesh_meter.h"
 #include "server/session/session_errors.h"

@@ -71,7 +71,9 @@ absl::Status ImportIdle(absl::Duration timeout) {
 
 absl::Status SessionDamaged(absl::string_view name) {
   return MakeError(absl::StatusCode::kDataLoss, reason::kInternal,
-                   absl::StrCat("an edit of session ", name, " failed half way; delete the session"),
+                   absl::StrCat("an edit of session ", name,
+                                " failed half way; a durable session is whole again after a restart of the "
+                                "daemon, any other is to be deleted"),
                    {{"session", std::string(name)}});
 }
 

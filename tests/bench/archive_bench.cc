@@ -16,6 +16,7 @@
 #include "core/archive/record.h"
 #include "core/edit/apply_patch.h"
 #include "tests/bench/arguments.h"
+#include "tests/bench/build_timing.h"
 #include "tests/bench/fixture.h"
 #include "tests/bench/operators.h"
 
@@ -47,22 +48,6 @@ Rebuilder ReadPages(const Kept& kept) {
 }
 
 Mesh Rebuild(const Kept& kept) { return Must(ReadPages(kept).Finish()); }
-
-/// `make` returns what is built, which is destroyed outside the time.
-template <typename Make>
-void Register(const char* name, size_t num_elements, Make make) {
-  const auto run = [num_elements, make](benchmark::State& state) {
-    for (auto _ : state) {
-      auto made = make();
-      benchmark::DoNotOptimize(&made);
-      state.PauseTiming();
-      { const auto gone = std::move(made); }
-      state.ResumeTiming();
-    }
-    state.SetItemsProcessed(state.iterations() * num_elements);
-  };
-  benchmark::RegisterBenchmark(name, run)->Unit(benchmark::kMillisecond);
-}
 
 void EncodePages(benchmark::State& state, const Mesh* mesh, size_t page_bytes) {
   for (auto _ : state) {
@@ -126,9 +111,9 @@ int main(int argc, char** argv) {
   const Mesh mesh = BuildMesh(input);
   const Kept kept = Keep(mesh);
   const size_t count = input.num_elements();
-  Register("archive/build", count, [&] { return BuildMesh(input); });
-  Register("archive/read_pages", count, [&] { return ReadPages(kept); });
-  Register("archive/rebuild", count, [&] { return Rebuild(kept); });
+  RegisterTimedBuild("archive/build", count, [&] { return BuildMesh(input); });
+  RegisterTimedBuild("archive/read_pages", count, [&] { return ReadPages(kept); });
+  RegisterTimedBuild("archive/rebuild", count, [&] { return Rebuild(kept); });
   benchmark::RegisterBenchmark("archive/encode_pages", EncodePages, &mesh, kept.page_bytes)
       ->Unit(benchmark::kMillisecond);
   // As many as there are places: more would time copies of the mesh.

@@ -5,26 +5,11 @@
 #include <functional>
 #include <string>
 
+#include "tests/bench/build_timing.h"
 #include "tests/bench/tasks.h"
 
 namespace dynmesh::bench {
 namespace {
-
-/// `make` returns what is built, which is destroyed outside the time.
-template <typename Make>
-void Register(const std::string& name, size_t num_elements, Make make) {
-  const auto run = [num_elements, make](benchmark::State& state) {
-    for (auto _ : state) {
-      auto made = make();
-      benchmark::DoNotOptimize(&made);
-      state.PauseTiming();
-      { const auto gone = std::move(made); }
-      state.ResumeTiming();
-    }
-    state.SetItemsProcessed(state.iterations() * num_elements);
-  };
-  benchmark::RegisterBenchmark(name.c_str(), run)->Unit(benchmark::kMillisecond);
-}
 
 Mesh BuildOneByOne(const MeshInput& input) {
   Mesh mesh;
@@ -53,13 +38,13 @@ Mesh BuildWithStored(const MeshInput& input) {
 void RegisterBuild(const Fixture& fixture) {
   const MeshInput& input = fixture.input;
   const size_t count = input.num_elements();
-  Register("build/bulk", count, [&] { return BuildMesh(input); });
-  Register("build/bulk_hilbert", count, [&] { return BuildMesh(input, SlotOrder::kHilbert); });
-  Register("build/bulk_all_relations", count, [&] { return BuildWithStored(input); });
-  Register("build/one_by_one", count, [&] { return BuildOneByOne(input); });
-  Register("build/limit", count, [&] { return BuildFlatDefault(input); });
-  Register("build/limit_hilbert", count, [&] { return BuildFlatDefault(HilbertSorted(input)); });
-  Register("build/limit_all_relations", count, [&] { return BuildAllFlat(input); });
+  RegisterTimedBuild("build/bulk", count, [&] { return BuildMesh(input); });
+  RegisterTimedBuild("build/bulk_hilbert", count, [&] { return BuildMesh(input, SlotOrder::kHilbert); });
+  RegisterTimedBuild("build/bulk_all_relations", count, [&] { return BuildWithStored(input); });
+  RegisterTimedBuild("build/one_by_one", count, [&] { return BuildOneByOne(input); });
+  RegisterTimedBuild("build/limit", count, [&] { return BuildFlatDefault(input); });
+  RegisterTimedBuild("build/limit_hilbert", count, [&] { return BuildFlatDefault(HilbertSorted(input)); });
+  RegisterTimedBuild("build/limit_all_relations", count, [&] { return BuildAllFlat(input); });
 }
 
 }  // namespace dynmesh::bench

@@ -77,6 +77,45 @@ TEST_F(DurabilityRpcTest, AfterARestartASessionIsListedBeforeItIsReadAndServesWh
   EXPECT_EQ(MustApply(TetBatch("mesh")).revision(), before.revision() + 1);
 }
 
+TEST_F(DurabilityRpcTest, SessionsThatAreNotLoadedAreListedInPagesAmongOthers) {
+  std::vector<std::string> names;
+  for (const char* name : {"a", "b", "c", "d", "e", "f", "g"}) {
+    names.push_back(name);
+    ASSERT_TRUE(Create(name, v1::DURABILITY_SYNC).ok());
+  }
+  Restart();
+  GetSession("c");
+  GetSession("f");
+  std::vector<std::string> listed, loaded;
+  v1::ListSessionsRequest request;
+  request.set_page_size(2);
+  do {
+    PatientContext context;
+    v1::ListSessionsResponse response;
+    ASSERT_TRUE(sessions().ListSessions(&context, request, &response).ok());
+    EXPECT_LE(response.sessions_size(), 2);
+    for (const v1::Session& session : response.sessions()) {
+      listed.push_back(session.name());
+      if (session.state() == v1::SESSION_STATE_LOADED) loaded.push_back(session.name());
+    }
+    request.set_page_token(response.next_page_token());
+  } while (!request.page_token().empty());
+  EXPECT_EQ(listed, names);
+  EXPECT_THAT(loaded, ::testing::ElementsAre("c", "f"));
+}
+
+TEST_F(DurabilityRpcTest, ADelayThatIsNoneIsRefused) {
+  ServerOptions options;
+  options.listen = {"127.0.0.1:0"};
+  for (const absl::Duration delay : {absl::Seconds(-1), absl::Seconds(11), absl::InfiniteDuration()}) {
+    const TemporaryDirectory directory;
+    options.data_dir = directory.path();
+    options.async_delay = delay;
+    const auto started = Server::Start(options);
+    EXPECT_EQ(started.status().code(), absl::StatusCode::kInvalidArgument) << delay;
+  }
+}
+
 TEST_F(DurabilityRpcTest, AStreamIsAnsweredInOrderAndWhenItsBatchesAreOnDisk) {
   ASSERT_TRUE(Create("mesh", v1::DURABILITY_SYNC).ok());
   PatientContext context;

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "tests/bench/build_timing.h"
 #include "tests/bench/digest.h"
 #include "tests/bench/fixture.h"
 
@@ -29,17 +30,7 @@ void RegisterPeerTask(const std::string& name, uint64_t expected, Task task) {
 /// `make` returns a pointer to what it builds, which is destroyed outside the time.
 template <typename Make>
 void RegisterPeerBuild(const std::string& name, size_t num_elements, Make make) {
-  const auto run = [num_elements, make](benchmark::State& state) {
-    for (auto _ : state) {
-      auto made = make();
-      benchmark::DoNotOptimize(&made);
-      state.PauseTiming();
-      { const auto gone = std::move(made); }
-      state.ResumeTiming();
-    }
-    state.SetItemsProcessed(state.iterations() * num_elements);
-  };
-  benchmark::RegisterBenchmark(("peer/" + name).c_str(), run)->Unit(benchmark::kMillisecond);
+  RegisterTimedBuild("peer/" + name, num_elements, make);
 }
 
 /// Edits of `items` places. `make` returns a pointer to what is edited, ready and with the places found, and
