@@ -22,6 +22,7 @@ constexpr char kRecordTag = 'r';
 constexpr char kTrimmedTag = 't';
 constexpr char kValueTag = 'v';
 constexpr size_t kSealBytes = sizeof(uint64_t);
+constexpr size_t kVersionBytes = 2 * sizeof(uint64_t);
 constexpr size_t kTagAt = 1 + sizeof(uint64_t);
 constexpr size_t kSuffixAt = kTagAt + 1;
 
@@ -58,6 +59,8 @@ absl::Status BadKey(absl::string_view key) {
   return StoreDamaged(absl::StrCat("the key ", absl::BytesToHexString(key), " is none that it writes"));
 }
 
+absl::Status BadManifest() { return StoreDamaged("a checkpoint's manifest is not valid"); }
+
 uint64_t SealOf(absl::string_view key, absl::string_view payload) {
   return XXH3_64bits_withSeed(payload.data(), payload.size(), XXH3_64bits(key.data(), key.size()));
 }
@@ -78,7 +81,11 @@ KeyRange DataOf(SessionId id) {
 
 KeyRange DataOfAll() { return {Tag(kSessionTag), AfterTag(kSessionTag)}; }
 
-std::string ManifestKey(SessionId id) { return SessionKey(id, kManifestTag); }
+std::string ManifestKey(SessionId id, uint64_t checkpoint) {
+  std::string key = SessionKey(id, kManifestTag);
+  AppendOrdered(checkpoint, key);
+  return key;
+}
 
 std::string PageKeyOf(SessionId id, PageKey page, uint64_t checkpoint) {
   std::string key = SessionKey(id, kPageTag);
@@ -99,9 +106,13 @@ std::string ValueKey(SessionId id, absl::string_view name) {
   return absl::StrCat(SessionKey(id, kValueTag), name);
 }
 
-KeyRange CheckpointOf(SessionId id) {
+KeyRange ManifestsOf(SessionId id) { return {SessionKey(id, kManifestTag), SessionKey(id, kPageTag)}; }
+
+KeyRange CheckpointsOf(SessionId id) {
   return {SessionKey(id, kManifestTag), SessionKey(id, static_cast<char>(kPageTag + 1))};
 }
+
+bool IsManifestKey(absl::string_view key) { return key.size() > kTagAt && key[kTagAt] == kManifestTag; }
 
 KeyRange RecordsOf(SessionId id, int64_t after, int64_t last) {
   return {KeyAfterRecord(id, after), KeyAfterRecord(id, last)};
@@ -119,6 +130,13 @@ absl::StatusOr<int64_t> RevisionOfKey(absl::string_view record_key) {
   const uint64_t revision = ReadOrdered(record_key.substr(kSuffixAt));
   if (revision == 0 || revision > kMaxNumber) return BadKey(record_key);
   return static_cast<int64_t>(revision);
+}
+
+absl::StatusOr<uint64_t> CheckpointOfKey(absl::string_view manifest_key) {
+  if (manifest_key.size() != kSuffixAt + sizeof(uint64_t)) return BadKey(manifest_key);
+  const uint64_t checkpoint = ReadOrdered(manifest_key.substr(kSuffixAt));
+  if (checkpoint == 0 || checkpoint > kMaxNumber) return BadKey(manifest_key);
+  return checkpoint;
 }
 
 absl::StatusOr<PageVersion> VersionOfKey(absl::string_view page_key) {
@@ -177,10 +195,14 @@ absl::StatusOr<StoredRecord> ReadRecord(absl::string_view payload) {
 
 std::string WriteManifest(const StoredManifest& manifest) {
   ByteWriter out;
-  out.Fixed<uint64_t>(manifest.checkpoint);
+  out.Reserve(2 * sizeof(uint64_t) + manifest.pages.size() * kVersionBytes + manifest.bytes.size() +
+              kSealBytes);
   out.Fixed<int64_t>(manifest.revision);
-  out.Fixed<uint64_t>(manifest.num_pages);
-  out.Fixed<uint64_t>(manifest.pages_hash);
+  out.Fixed<uint64_t>(manifest.pages.size());
+  for (const PageVersion& version : manifest.pages) {
+    out.Fixed<uint64_t>(version.page);
+    out.Fixed<uint64_t>(version.checkpoint);
+  }
   out.Bytes(manifest.bytes);
   return std::move(out).Take();
 }
@@ -188,20 +210,19 @@ std::string WriteManifest(const StoredManifest& manifest) {
 absl::StatusOr<StoredManifest> ReadManifest(absl::string_view payload) {
   ByteReader in(payload);
   StoredManifest manifest;
-  manifest.checkpoint = in.Fixed<uint64_t>();
   manifest.revision = in.Fixed<int64_t>();
-  manifest.num_pages = in.Fixed<uint64_t>();
-  manifest.pages_hash = in.Fixed<uint64_t>();
-  manifest.bytes = in.Bytes(in.remaining());
-  if (!in.ok() || manifest.checkpoint == 0 || manifest.checkpoint > kMaxNumber || manifest.revision < 0) {
-    return StoreDamaged("a checkpoint's manifest is not valid");
+  const auto num_pages = in.Fixed<uint64_t>();
+  if (!in.ok() || manifest.revision < 0 || num_pages > in.remaining() / kVersionBytes) return BadManifest();
+  manifest.pages.reserve(num_pages);
+  for (uint64_t i = 0; i < num_pages; ++i) {
+    const auto page = in.Fixed<uint64_t>();
+    const auto checkpoint = in.Fixed<uint64_t>();
+    const bool ascends = i == 0 || page > manifest.pages.back().page;
+    if (!ascends || checkpoint == 0 || checkpoint > kMaxNumber) return BadManifest();
+    manifest.pages.push_back({page, checkpoint});
   }
+  manifest.bytes = in.Bytes(in.remaining());
   return manifest;
-}
-
-uint64_t PageHash(const PageVersion& version) {
-  const uint64_t words[] = {version.page, version.checkpoint};
-  return XXH3_64bits(words, sizeof(words));
 }
 
 }  // namespace dynmesh::layout

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
@@ -12,7 +13,7 @@
 /// Keys and values of a store in an Engine. FORMAT.md says what they are, byte by byte.
 namespace dynmesh::layout {
 
-inline constexpr uint64_t kFormat = 1;
+inline constexpr uint64_t kFormat = 2;  ///< 1 was never released
 
 inline constexpr uint64_t kMaxNumber = INT64_MAX;  ///< of all that counts, so that one more never overflows
 
@@ -33,22 +34,31 @@ absl::string_view NameOfKey(absl::string_view key);
 /// Everything that is kept of a session, and of all.
 KeyRange DataOf(SessionId id);
 KeyRange DataOfAll();
-std::string ManifestKey(SessionId id);
+std::string ManifestKey(SessionId id, uint64_t checkpoint);
 std::string PageKeyOf(SessionId id, PageKey page, uint64_t checkpoint);
 std::string RecordKey(SessionId id, int64_t revision);
 std::string TrimmedKey(SessionId id);
 std::string ValueKey(SessionId id, absl::string_view name);
-/// The manifest and the pages: the manifest comes first.
-KeyRange CheckpointOf(SessionId id);
+KeyRange ManifestsOf(SessionId id);
+/// The manifests and all pages: the manifests come first.
+KeyRange CheckpointsOf(SessionId id);
+bool IsManifestKey(absl::string_view key);
 /// Records after `after`, up to and including `last`.
 KeyRange RecordsOf(SessionId id, int64_t after, int64_t last = INT64_MAX);
 
 /// What a key of DataOfAll() tells. Errors: DATA_LOSS STORE_DAMAGED: it is too short.
 absl::StatusOr<SessionId> SessionOfKey(absl::string_view key);
 absl::StatusOr<int64_t> RevisionOfKey(absl::string_view record_key);
+absl::StatusOr<uint64_t> CheckpointOfKey(absl::string_view manifest_key);
 struct PageVersion {
   PageKey page;
   uint64_t checkpoint;  ///< the one that wrote it
+
+  friend bool operator==(const PageVersion&, const PageVersion&) = default;
+  template <typename H>
+  friend H AbslHashValue(H hash, const PageVersion& version) {
+    return H::combine(std::move(hash), version.page, version.checkpoint);
+  }
 };
 absl::StatusOr<PageVersion> VersionOfKey(absl::string_view page_key);
 
@@ -69,15 +79,12 @@ std::string WriteRecord(const StoredRecord& record);
 absl::StatusOr<StoredRecord> ReadRecord(absl::string_view payload);
 
 struct StoredManifest {
-  uint64_t checkpoint = 0;  ///< its number: 1 for the first of a session
   int64_t revision = 0;
-  uint64_t num_pages = 0;
-  uint64_t pages_hash = 0;  ///< PageHash() of all, combined by exclusive or
+  std::vector<PageVersion> pages;  ///< ascending by page, each once
   absl::string_view bytes;
 };
 std::string WriteManifest(const StoredManifest& manifest);
 absl::StatusOr<StoredManifest> ReadManifest(absl::string_view payload);
-uint64_t PageHash(const PageVersion& version);
 
 }  // namespace dynmesh::layout
 

@@ -1,16 +1,36 @@
 #include "server/store/local_checkpoint.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "core/mesh/error.h"
 
 namespace dynmesh {
 
-void AddTrim(layout::SessionId id, int64_t revision, EngineBatch& batch) {
-  layout::KeyRange records = layout::RecordsOf(id, 0, revision);
-  batch.DeleteRange(std::move(records.from), std::move(records.to));
+void AddTrim(layout::SessionId id, int64_t revision, absl::Span<const RecordRange> kept, EngineBatch& batch) {
+  std::vector<RecordRange> sorted(kept.begin(), kept.end());
+  std::sort(sorted.begin(), sorted.end(),
+            [](const RecordRange& a, const RecordRange& b) { return a.after < b.after; });
+  const auto add = [&](int64_t after, int64_t last) {
+    if (after >= last) return;
+    layout::KeyRange records = layout::RecordsOf(id, after, last);
+    batch.DeleteRange(std::move(records.from), std::move(records.to));
+  };
+  int64_t after = 0;
+  for (const RecordRange& range : sorted) {
+    add(after, std::min(range.after, revision));
+    after = std::max(after, range.last);
+  }
+  add(after, revision);
   const std::string key = layout::TrimmedKey(id);
   batch.Put(key, layout::Seal(key, layout::WriteNumber(static_cast<uint64_t>(revision))));
+}
+
+void AddDrop(layout::SessionId id, uint64_t number, CheckpointTable& table, EngineBatch& batch) {
+  for (const layout::PageVersion& version : table.Remove(number)) {
+    batch.Delete(layout::PageKeyOf(id, version.page, version.checkpoint));
+  }
+  batch.Delete(layout::ManifestKey(id, number));
 }
 
 LocalCheckpoint::~LocalCheckpoint() {
@@ -56,46 +76,51 @@ absl::Status LocalCheckpoint::DropPage(PageKey page) {
   return Enqueue(std::move(batch));
 }
 
-absl::Status LocalCheckpoint::Commit(std::string manifest) {
+absl::Status LocalCheckpoint::Commit(std::string manifest, FormerCheckpoint former) {
   ended_ = true;
-  PageTable pages = *session_->pages_;
+  CheckpointTable table = *session_->table_;
   EngineBatch batch;
-  AddPages(pages, batch);
-  AddManifest(pages, std::move(manifest), batch);
+  for (const layout::PageVersion& leftover : table.leftovers()) batch.Delete(KeyOf(leftover));
+  table.ClearLeftovers();
+  const uint64_t last = table.last_number();
+  table.Add(number_, {revision_, Pages()});
+  if (last != 0 && former == FormerCheckpoint::kDrop) AddDrop(session_->owned_.id(), last, table, batch);
+  AddManifest(table.last_pages(), std::move(manifest), batch);
   // Records before a gap are of no use, and the chain of those after it begins here.
-  if (revision_ > session_->progress_->last) AddTrim(session_->owned_.id(), revision_, batch);
+  if (revision_ > session_->progress_->last) AddTrim(session_->owned_.id(), revision_, {}, batch);
   auto on_disk = [progress = session_->progress_, revision = revision_](const absl::Status& status) {
     progress->SetDurable(revision, status);
   };
   DYNMESH_RETURN_IF_ERROR(session_->owned_.CommitAfterBackground(std::move(batch), std::move(on_disk)));
-  NoteCommitted(std::move(pages));
+  NoteCommitted(std::move(table));
   return absl::OkStatus();
 }
 
-void LocalCheckpoint::AddPages(PageTable& pages, EngineBatch& batch) const {
-  for (const layout::PageVersion& leftover : pages.leftovers()) batch.Delete(KeyOf(leftover));
-  pages.ClearLeftovers();
-  for (const auto& [page, change] : changes_) {
-    if (const uint64_t replaced = pages.Find(page); replaced != 0) batch.Delete(KeyOf({page, replaced}));
-    if (change == Change::kWritten) {
-      pages.Put({page, number_});
-    } else {
-      pages.Remove(page);
-    }
+/// Those of the last checkpoint, with the changes.
+std::vector<layout::PageVersion> LocalCheckpoint::Pages() const {
+  std::vector<layout::PageVersion> pages;
+  for (const layout::PageVersion& version : session_->table_->last_pages()) {
+    if (!changes_.contains(version.page)) pages.push_back(version);
   }
+  for (const auto& [page, change] : changes_) {
+    if (change == Change::kWritten) pages.push_back({page, number_});
+  }
+  std::sort(pages.begin(), pages.end(),
+            [](const layout::PageVersion& a, const layout::PageVersion& b) { return a.page < b.page; });
+  return pages;
 }
 
-void LocalCheckpoint::AddManifest(const PageTable& pages, std::string manifest, EngineBatch& batch) const {
-  const std::string key = layout::ManifestKey(session_->owned_.id());
-  batch.Put(key, layout::Seal(
-                     key, layout::WriteManifest({number_, revision_, pages.size(), pages.hash(), manifest})));
+void LocalCheckpoint::AddManifest(const std::vector<layout::PageVersion>& pages, std::string manifest,
+                                  EngineBatch& batch) const {
+  const std::string key = layout::ManifestKey(session_->owned_.id(), number_);
+  batch.Put(key, layout::Seal(key, layout::WriteManifest({revision_, pages, manifest})));
 }
 
-void LocalCheckpoint::NoteCommitted(PageTable pages) {
+void LocalCheckpoint::NoteCommitted(CheckpointTable table) {
   SessionProgress& progress = *session_->progress_;
   if (revision_ > progress.last) progress.trimmed = progress.last = revision_;
   progress.checkpoint = revision_;
-  *session_->pages_ = std::move(pages);
+  *session_->table_ = std::move(table);
 }
 
 }  // namespace dynmesh

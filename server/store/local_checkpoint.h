@@ -3,41 +3,49 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "absl/container/flat_hash_map.h"
+#include "absl/types/span.h"
+#include "server/store/checkpoint_table.h"
 #include "server/store/engine.h"
 #include "server/store/layout.h"
 #include "server/store/local_session.h"
-#include "server/store/page_table.h"
 #include "server/store/store.h"
 
 namespace dynmesh {
 
-/// Deletes records up to and including `revision`.
-void AddTrim(layout::SessionId id, int64_t revision, EngineBatch& batch);
+/// Deletes records up to and including `revision`, but for those of `kept`.
+void AddTrim(layout::SessionId id, int64_t revision, absl::Span<const RecordRange> kept, EngineBatch& batch);
+
+/// Deletes a checkpoint, from `table` too, and the pages that only it has.
+void AddDrop(layout::SessionId id, uint64_t number, CheckpointTable& table, EngineBatch& batch);
 
 /// A checkpoint of a LocalSession: writes pages under its own number, beside those of the last one. The batch
-/// that commits it puts the manifest and deletes the pages that it replaces.
+/// that commits it puts the manifest and deletes that of the last one, if that is not kept, with the pages
+/// that only it had.
 class LocalCheckpoint final : public CheckpointWriter {
  public:
   LocalCheckpoint(LocalSession* session, int64_t revision)
-      : session_(session), revision_(revision), number_(session->pages_->TakeNextCheckpoint()) {}
+      : session_(session), revision_(revision), number_(session->table_->TakeNextNumber()) {}
   LocalCheckpoint(const LocalCheckpoint&) = delete;
   LocalCheckpoint& operator=(const LocalCheckpoint&) = delete;
   ~LocalCheckpoint() override;
 
   absl::Status WritePage(PageKey page, std::string bytes) override;
   absl::Status DropPage(PageKey page) override;
-  absl::Status Commit(std::string manifest) override;
+  using CheckpointWriter::Commit;
+  absl::Status Commit(std::string manifest, FormerCheckpoint former) override;
 
  private:
   enum class Change { kWritten, kDropped };
 
   std::string KeyOf(const layout::PageVersion& version) const;
   absl::Status Enqueue(EngineBatch batch);
-  void AddPages(PageTable& pages, EngineBatch& batch) const;
-  void AddManifest(const PageTable& pages, std::string manifest, EngineBatch& batch) const;
-  void NoteCommitted(PageTable pages);
+  std::vector<layout::PageVersion> Pages() const;
+  void AddManifest(const std::vector<layout::PageVersion>& pages, std::string manifest,
+                   EngineBatch& batch) const;
+  void NoteCommitted(CheckpointTable table);
 
   LocalSession* const session_;
   const int64_t revision_;

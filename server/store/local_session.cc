@@ -66,24 +66,23 @@ absl::Status LocalSession::Load() {
 }
 
 absl::Status LocalSession::LoadCheckpoint() {
-  DYNMESH_ASSIGN_OR_RETURN(const auto checkpoint, ReadManifest());
-  if (checkpoint.has_value()) progress_->checkpoint = progress_->last = checkpoint->revision;
+  DYNMESH_ASSIGN_OR_RETURN(const std::vector<Checkpoint> checkpoints, ListCheckpoints());
+  if (!checkpoints.empty()) progress_->checkpoint = progress_->last = checkpoints.back().revision;
   return absl::OkStatus();
 }
 
-absl::StatusOr<absl::optional<Checkpoint>> LocalSession::ReadManifest() const {
-  absl::optional<Checkpoint> checkpoint;
-  DYNMESH_ASSIGN_OR_RETURN(const auto payload, GetPayload(owned_.engine(), layout::ManifestKey(owned_.id())));
-  if (!payload.has_value()) return checkpoint;
-  DYNMESH_ASSIGN_OR_RETURN(const layout::StoredManifest manifest, layout::ReadManifest(*payload));
-  checkpoint = Checkpoint{manifest.revision, std::string(manifest.bytes)};
-  return checkpoint;
-}
-
-absl::StatusOr<absl::optional<Checkpoint>> LocalSession::FindCheckpoint() {
-  auto checkpoint = ReadManifest();
-  DYNMESH_RETURN_IF_ERROR(Named(checkpoint.status()));
-  return checkpoint;
+absl::StatusOr<std::vector<Checkpoint>> LocalSession::ListCheckpoints() {
+  std::vector<Checkpoint> checkpoints;
+  const layout::KeyRange range = layout::ManifestsOf(owned_.id());
+  const auto visit = [&](absl::string_view key, absl::string_view value) -> absl::Status {
+    DYNMESH_ASSIGN_OR_RETURN(const uint64_t number, layout::CheckpointOfKey(key));
+    DYNMESH_ASSIGN_OR_RETURN(const absl::string_view payload, layout::Unseal(key, value));
+    DYNMESH_ASSIGN_OR_RETURN(const layout::StoredManifest manifest, layout::ReadManifest(payload));
+    checkpoints.push_back({manifest.revision, std::string(manifest.bytes), number});
+    return absl::OkStatus();
+  };
+  DYNMESH_RETURN_IF_ERROR(Named(owned_.engine().Scan(range.from, range.to, visit)));
+  return checkpoints;
 }
 
 absl::Status LocalSession::LoadRecords() {
@@ -125,26 +124,37 @@ void LocalSession::Append(Record record, Durability durability, Done done) {
   owned_.Enqueue(std::move(write));
 }
 
-absl::Status LocalSession::ReadRecords(int64_t after, RecordFn fn) {
-  after = std::max<int64_t>(after, 0);
-  if (after < progress_->trimmed) return StoreTrimmed(after, progress_->trimmed);
+absl::Status LocalSession::ReadRecords(const RecordRange& range, RecordFn fn) {
+  const int64_t after = std::max<int64_t>(range.after, 0);
   RecordChain chain(after);
+  bool any = false;
   const auto visit = [&](absl::string_view key, absl::string_view value) -> absl::Status {
     DYNMESH_ASSIGN_OR_RETURN(const int64_t revision, layout::RevisionOfKey(key));
     DYNMESH_ASSIGN_OR_RETURN(const absl::string_view payload, layout::Unseal(key, value));
     DYNMESH_ASSIGN_OR_RETURN(const layout::StoredRecord record, layout::ReadRecord(payload));
-    DYNMESH_RETURN_IF_ERROR(chain.Follow(revision, record.previous));
+    const absl::Status follows = chain.Follow(revision, record.previous);
+    if (!follows.ok()) return IsTrimmed(after) ? StoreTrimmed(after, progress_->trimmed) : follows;
+    any = true;
     return fn(revision, record.bytes);
   };
-  const layout::KeyRange range = layout::RecordsOf(owned_.id(), after);
-  return Named(owned_.engine().Scan(range.from, range.to, visit));
+  const layout::KeyRange keys = layout::RecordsOf(owned_.id(), after, std::max(range.last, after));
+  DYNMESH_RETURN_IF_ERROR(Named(owned_.engine().Scan(keys.from, keys.to, visit)));
+  if (any || after >= range.last || !IsTrimmed(after)) return absl::OkStatus();
+  return StoreTrimmed(after, progress_->trimmed);
 }
 
-absl::StatusOr<absl::optional<Checkpoint>> LocalSession::ReadCheckpoint(PageFn fn) {
+absl::StatusOr<Checkpoint> LocalSession::ReadCheckpoint(uint64_t number, PageFn fn) {
+  DYNMESH_ASSIGN_OR_RETURN(absl::optional<Checkpoint> checkpoint, ReadPages(number, fn));
+  if (!checkpoint.has_value() || number == 0) return CheckpointNotFound(number);
+  return *std::move(checkpoint);
+}
+
+absl::StatusOr<absl::optional<Checkpoint>> LocalSession::ReadPages(uint64_t number, PageFn fn) {
   absl::optional<Checkpoint> checkpoint;
-  absl::StatusOr<PageTable> pages = PageTable::Read(owned_.engine(), owned_.id(), checkpoint, fn);
-  DYNMESH_RETURN_IF_ERROR(Named(pages.status()));
-  KeepPages(*std::move(pages));
+  absl::StatusOr<CheckpointTable> table =
+      CheckpointTable::Read(owned_.engine(), owned_.id(), number, checkpoint, fn);
+  DYNMESH_RETURN_IF_ERROR(Named(table.status()));
+  KeepTable(*std::move(table));
   return checkpoint;
 }
 
@@ -153,7 +163,7 @@ absl::StatusOr<std::unique_ptr<CheckpointWriter>> LocalSession::BeginCheckpoint(
   const int64_t before = progress_->checkpoint;
   absl::Status status =
       revision >= before
-          ? LoadPages()
+          ? LoadTable()
           : BadRevision(revision, absl::StrCat("that of the last checkpoint, ", before, ", or greater"));
   if (!status.ok()) {
     checkpoint_open_ = false;
@@ -162,30 +172,48 @@ absl::StatusOr<std::unique_ptr<CheckpointWriter>> LocalSession::BeginCheckpoint(
   return std::unique_ptr<CheckpointWriter>(std::make_unique<LocalCheckpoint>(this, revision));
 }
 
-absl::Status LocalSession::LoadPages() {
-  if (HasPages()) return absl::OkStatus();
-  return ReadCheckpoint([](PageKey, absl::string_view) { return absl::OkStatus(); }).status();
+absl::Status LocalSession::LoadTable() {
+  if (HasTable()) return absl::OkStatus();
+  return ReadPages(0, [](PageKey, absl::string_view) { return absl::OkStatus(); }).status();
 }
 
-// If none are there: what is there knows of all checkpoints of this owner, and `pages` may not.
-void LocalSession::KeepPages(PageTable pages) {
+// If none is there: what is there knows of all checkpoints of this owner, and `table` may not.
+void LocalSession::KeepTable(CheckpointTable table) {
   MutexLock lock(&mu_);
-  if (!pages_.has_value()) pages_ = std::move(pages);
+  if (!table_.has_value()) table_ = std::move(table);
 }
 
-bool LocalSession::HasPages() {
+bool LocalSession::HasTable() {
   MutexLock lock(&mu_);
-  return pages_.has_value();
+  return table_.has_value();
 }
 
-absl::Status LocalSession::TrimRecords(int64_t revision) {
+absl::Status LocalSession::DropCheckpoint(uint64_t number) {
+  if (checkpoint_open_.exchange(true)) return CheckpointOpen(owned_.name());
+  const absl::Status dropped = DropNow(number);
+  checkpoint_open_ = false;
+  return dropped;
+}
+
+absl::Status LocalSession::DropNow(uint64_t number) {
+  DYNMESH_RETURN_IF_ERROR(LoadTable());
+  if (!table_->Contains(number) || number == table_->last_number()) return CheckpointNotFound(number);
+  EngineBatch batch;
+  AddDrop(owned_.id(), number, *table_, batch);
+  AwaitedWrite write(std::move(batch), Durability::kAsync);
+  owned_.EnqueueBackground(std::move(write.write));
+  return write.Wait();
+}
+
+absl::Status LocalSession::TrimRecords(int64_t revision, absl::Span<const RecordRange> kept) {
   const int64_t checkpoint = progress_->checkpoint;
   if (revision > checkpoint) {
     return BadRevision(revision, absl::StrCat("that of the last checkpoint, ", checkpoint, ", or less"));
   }
-  if (revision <= progress_->trimmed) return absl::OkStatus();
+  if (revision <= progress_->trimmed) revision = progress_->trimmed;  // ranges may be kept no more
+  if (revision <= 0) return absl::OkStatus();
   Committer::Write write;
-  AddTrim(owned_.id(), revision, write.batch);
+  AddTrim(owned_.id(), revision, kept, write.batch);
   progress_->trimmed = revision;
   owned_.EnqueueBackground(std::move(write));
   return absl::OkStatus();

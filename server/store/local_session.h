@@ -7,11 +7,12 @@
 #include <memory>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "absl/base/thread_annotations.h"
 #include "server/session/mutex.h"
+#include "server/store/checkpoint_table.h"
 #include "server/store/ownership.h"
-#include "server/store/page_table.h"
 #include "server/store/store.h"
 
 namespace dynmesh {
@@ -57,11 +58,14 @@ class LocalSession final : public SessionStore {
   void WatchDurable(Watcher watcher) override { progress_->Watch(std::move(watcher)); }
 
   void Append(Record record, Durability durability, Done done) override;
-  absl::Status ReadRecords(int64_t after, RecordFn fn) override;
-  absl::StatusOr<absl::optional<Checkpoint>> FindCheckpoint() override;
-  absl::StatusOr<absl::optional<Checkpoint>> ReadCheckpoint(PageFn fn) override;
+  using SessionStore::ReadRecords;
+  absl::Status ReadRecords(const RecordRange& range, RecordFn fn) override;
+  absl::StatusOr<std::vector<Checkpoint>> ListCheckpoints() override;
+  absl::StatusOr<Checkpoint> ReadCheckpoint(uint64_t number, PageFn fn) override;
   absl::StatusOr<std::unique_ptr<CheckpointWriter>> BeginCheckpoint(int64_t revision) override;
-  absl::Status TrimRecords(int64_t revision) override;
+  absl::Status DropCheckpoint(uint64_t number) override;
+  using SessionStore::TrimRecords;
+  absl::Status TrimRecords(int64_t revision, absl::Span<const RecordRange> kept) override;
   absl::Status PutValue(absl::string_view name, std::string bytes) override;
   absl::Status DeleteValue(absl::string_view name) override;
   absl::StatusOr<absl::optional<std::string>> GetValue(absl::string_view name) override;
@@ -72,12 +76,15 @@ class LocalSession final : public SessionStore {
   explicit LocalSession(OwnedSession owned) : owned_(std::move(owned)) {}
   absl::Status Load();
   absl::Status LoadCheckpoint();
-  absl::StatusOr<absl::optional<Checkpoint>> ReadManifest() const;
   absl::Status LoadRecords();
   absl::Status CheckAppend(const Record& record) const;
-  absl::Status LoadPages();
-  void KeepPages(PageTable pages);
-  bool HasPages();
+  absl::StatusOr<absl::optional<Checkpoint>> ReadPages(uint64_t number, PageFn fn);
+  /// Asked after reading, as records may have been trimmed meanwhile.
+  bool IsTrimmed(int64_t after) const { return after < progress_->trimmed; }
+  absl::Status LoadTable();
+  void KeepTable(CheckpointTable table);
+  bool HasTable();
+  absl::Status DropNow(uint64_t number);
   absl::Status Named(const absl::Status& status) const;
 
   const OwnedSession owned_;
@@ -86,7 +93,7 @@ class LocalSession final : public SessionStore {
   std::atomic<bool> checkpoint_open_{false};
   Mutex mu_;
   /// From the first reading of all pages on. It is set once, under mu_; then it is the open checkpoint's own.
-  absl::optional<PageTable> pages_;
+  absl::optional<CheckpointTable> table_;
 };
 
 }  // namespace dynmesh

@@ -42,7 +42,8 @@ absl::Status LocalStore::LoadFormat() {
   DYNMESH_ASSIGN_OR_RETURN(const absl::optional<std::string> value, engine_->Get(key));
   if (value.has_value()) {
     DYNMESH_ASSIGN_OR_RETURN(const uint64_t format, ReadSealedNumber(key, *value));
-    return format <= layout::kFormat ? absl::OkStatus() : StoreFormatNewer(format, layout::kFormat);
+    if (format < layout::kFormat) return StoreFormatOlder(format, layout::kFormat);
+    return format == layout::kFormat ? absl::OkStatus() : StoreFormatNewer(format, layout::kFormat);
   }
   DYNMESH_ASSIGN_OR_RETURN(const auto any, engine_->LastKey(layout::Names().from, layout::DataOfAll().to));
   if (any.has_value()) return StoreDamaged("it does not say its format");

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/functional/any_invocable.h"
@@ -12,6 +13,7 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 #include "absl/types/optional.h"
+#include "absl/types/span.h"
 
 /// Where sessions outlive the daemon. A store keeps bytes: what they mean is the session's business.
 namespace dynmesh {
@@ -32,6 +34,16 @@ struct Record {
 struct Checkpoint {
   int64_t revision = 0;
   std::string manifest;  ///< the session's own: how to read the pages
+  uint64_t number = 0;   ///< greater than those of all before; never used again
+};
+
+/// What becomes of the checkpoint before when another is made.
+enum class FormerCheckpoint { kDrop, kKeep };
+
+/// Records with revisions in (after, last].
+struct RecordRange {
+  int64_t after = 0;
+  int64_t last = 0;
 };
 
 using PageKey = uint64_t;
@@ -39,7 +51,7 @@ using PageKey = uint64_t;
 /// A checkpoint being made. Destroyed without Commit(), it leaves nothing behind, and neither does a crash.
 ///
 /// Pages go to the disk in the background of appends. Those that are neither written nor dropped stay as they
-/// are in the checkpoint before.
+/// are in the checkpoint before, and lie on the disk once for all that have them.
 /// Errors: those of everything that writes to the SessionStore; of pages that were fenced, by Commit().
 /// Thread safety: one thread at a time. Must not outlive its session.
 class CheckpointWriter {
@@ -52,24 +64,26 @@ class CheckpointWriter {
   virtual absl::Status DropPage(PageKey page) = 0;
   /// Makes it the session's checkpoint, all or nothing, and returns once it is on disk. The writer cannot be
   /// used after it.
-  virtual absl::Status Commit(std::string manifest) = 0;
+  virtual absl::Status Commit(std::string manifest, FormerCheckpoint former) = 0;
+  absl::Status Commit(std::string manifest) { return Commit(std::move(manifest), FormerCheckpoint::kDrop); }
 };
 
-/// One session's records, checkpoint and named values, for as long as no other owner opens it.
+/// One session's records, checkpoints and named values, for as long as no other owner opens it.
 ///
 ///     session->Append({43, bytes}, Durability::kSync, [](const absl::Status& status) { ... });
 ///     auto writer = session->BeginCheckpoint(43);          // *writer: ->WritePage(...), ->Commit(...)
 ///     session->TrimRecords(43);
 ///
-/// Recovery: ReadCheckpoint(), then ReadRecords() after its revision.
+/// Recovery: ReadCheckpoint(), then ReadRecords() after its revision. The same with an older one that was
+/// kept gives what the session was before.
 ///
 /// Errors of all that writes: ABORTED FENCED when another owner has opened the session since; NOT_FOUND
 /// SESSION_DELETED; UNAVAILABLE STORE_FAILED or RESOURCE_EXHAUSTED STORE_FULL when it failed;
 /// FAILED_PRECONDITION STORE_FAILED or RESOURCE_EXHAUSTED STORE_FULL when one before it failed, for then the
 /// store only reads until it is opened again.
 /// Errors of all that reads: DATA_LOSS STORE_DAMAGED, naming the session; UNAVAILABLE STORE_FAILED.
-/// Thread safety: full, except that one thread at a time calls Append() and BeginCheckpoint(). Must not
-/// outlive its store.
+/// Thread safety: full, except that one thread at a time calls Append(), and one BeginCheckpoint() and
+/// DropCheckpoint(). Must not outlive its store.
 class SessionStore {
  public:
   /// Called exactly once, on a thread of the store, never from within the call that was given it. Must be
@@ -101,16 +115,19 @@ class SessionStore {
   /// LIMIT_EXCEEDED (kMaxStoredBytes).
   virtual void Append(Record record, Durability durability, Done done) = 0;
 
-  /// Records with greater revisions than `after`, in order; fn's first error ends it and is returned.
-  /// fn must not write to the store. Errors: OUT_OF_RANGE STORE_TRIMMED: the first ones are gone.
-  virtual absl::Status ReadRecords(int64_t after, RecordFn fn) = 0;
+  /// Records of the range, in order; fn's first error ends it and is returned. fn must not write to the
+  /// store. Errors: OUT_OF_RANGE STORE_TRIMMED: the first ones are gone. The last ones of a range that was
+  /// trimmed in part are not missed: look at the last revision.
+  virtual absl::Status ReadRecords(const RecordRange& range, RecordFn fn) = 0;
+  /// The same for all with greater revisions than `after`.
+  absl::Status ReadRecords(int64_t after, RecordFn fn) { return ReadRecords({after, INT64_MAX}, fn); }
 
-  /// The checkpoint that was committed last, without its pages.
-  virtual absl::StatusOr<absl::optional<Checkpoint>> FindCheckpoint() = 0;
+  /// Those that are kept, by number: the last one is the session's, the others its former ones.
+  virtual absl::StatusOr<std::vector<Checkpoint>> ListCheckpoints() = 0;
 
-  /// The checkpoint that was committed last, with its pages in ascending order; nullopt when there is none.
-  /// Pages are handed out before the last one is known to be good: drop them on an error.
-  virtual absl::StatusOr<absl::optional<Checkpoint>> ReadCheckpoint(PageFn fn) = 0;
+  /// A checkpoint that is kept, with its pages in ascending order. Pages are handed out before the last one
+  /// is known to be good: drop them on an error. Errors: NOT_FOUND CHECKPOINT_NOT_FOUND.
+  virtual absl::StatusOr<Checkpoint> ReadCheckpoint(uint64_t number, PageFn fn) = 0;
 
   /// One at a time. `revision` is that of the state which the records after it will be added to: pages may
   /// hold later changes, if records tell them again. A checkpoint beyond the last record replaces all
@@ -118,9 +135,14 @@ class SessionStore {
   /// the last checkpoint's).
   virtual absl::StatusOr<std::unique_ptr<CheckpointWriter>> BeginCheckpoint(int64_t revision) = 0;
 
-  /// Deletes records up to and including `revision`, soon.
+  /// Deletes a former checkpoint and the pages that no other one has. Not from a Done. Errors: NOT_FOUND
+  /// CHECKPOINT_NOT_FOUND, also for the last one; FAILED_PRECONDITION CHECKPOINT_OPEN.
+  virtual absl::Status DropCheckpoint(uint64_t number) = 0;
+
+  /// Deletes records up to and including `revision`, but for those of `kept`, soon.
   /// Errors: INVALID_ARGUMENT BAD_ARGUMENT: no checkpoint holds what they say.
-  virtual absl::Status TrimRecords(int64_t revision) = 0;
+  virtual absl::Status TrimRecords(int64_t revision, absl::Span<const RecordRange> kept) = 0;
+  absl::Status TrimRecords(int64_t revision) { return TrimRecords(revision, {}); }
 
   /// Small values by name, on disk when the call returns. Not from a Done.
   virtual absl::Status PutValue(absl::string_view name, std::string bytes) = 0;

@@ -46,6 +46,14 @@ absl::Status StoreFormatNewer(uint64_t found, uint64_t supported) {
       {{"found", absl::StrCat(found)}, {"supported", absl::StrCat(supported)}});
 }
 
+absl::Status StoreFormatOlder(uint64_t found, uint64_t supported) {
+  return FailedPrecondition(
+      reason::kStoreFormatOlder,
+      absl::StrCat("the store is of format ", found, ", which was never released; this build knows format ",
+                   supported, ": begin with an empty directory"),
+      {{"found", absl::StrCat(found)}, {"supported", absl::StrCat(supported)}});
+}
+
 absl::Status StoreInUse(absl::string_view directory, absl::string_view pid) {
   return FailedPrecondition(
       reason::kStoreInUse,
@@ -70,6 +78,12 @@ absl::Status CheckpointOpen(absl::string_view session) {
   return FailedPrecondition(reason::kCheckpointOpen,
                             absl::StrCat("a checkpoint of session ", session, " is being made"),
                             {{"session", std::string(session)}});
+}
+
+absl::Status CheckpointNotFound(uint64_t number) {
+  return MakeError(absl::StatusCode::kNotFound, reason::kCheckpointNotFound,
+                   absl::StrCat("there is no checkpoint ", number, " to be had"),
+                   {{"checkpoint", absl::StrCat(number)}});
 }
 
 absl::Status BadRevision(int64_t revision, absl::string_view what) {

@@ -13,6 +13,8 @@ namespace reason {
 inline constexpr char kStoreDamaged[] = "STORE_DAMAGED";
 inline constexpr char kStoreFull[] = "STORE_FULL";
 inline constexpr char kStoreFailed[] = "STORE_FAILED";
+inline constexpr char kCheckpointNotFound[] = "CHECKPOINT_NOT_FOUND";
+inline constexpr char kStoreFormatOlder[] = "STORE_FORMAT_OLDER";
 inline constexpr char kStoreFormatNewer[] = "STORE_FORMAT_NEWER";
 inline constexpr char kStoreInUse[] = "STORE_IN_USE";
 inline constexpr char kStoreTrimmed[] = "STORE_TRIMMED";
@@ -40,6 +42,9 @@ absl::Status StoreReadOnly(const absl::Status& first);
 /// FAILED_PRECONDITION STORE_FORMAT_NEWER, metadata found and supported.
 absl::Status StoreFormatNewer(uint64_t found, uint64_t supported);
 
+/// FAILED_PRECONDITION STORE_FORMAT_OLDER, metadata found and supported.
+absl::Status StoreFormatOlder(uint64_t found, uint64_t supported);
+
 /// FAILED_PRECONDITION STORE_IN_USE, metadata pid: "" when the other process has not said it.
 absl::Status StoreInUse(absl::string_view directory, absl::string_view pid);
 
@@ -51,6 +56,9 @@ absl::Status Fenced(absl::string_view session);
 
 /// FAILED_PRECONDITION CHECKPOINT_OPEN, metadata session.
 absl::Status CheckpointOpen(absl::string_view session);
+
+/// NOT_FOUND CHECKPOINT_NOT_FOUND, metadata checkpoint.
+absl::Status CheckpointNotFound(uint64_t number);
 
 /// INVALID_ARGUMENT BAD_ARGUMENT, metadata revision: `what` it has to be, after "must be ".
 absl::Status BadRevision(int64_t revision, absl::string_view what);

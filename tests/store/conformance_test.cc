@@ -237,6 +237,90 @@ TEST_P(ConformanceTest, TrimmedRecordsAreGone) {
   check(ReopenNamed("part"));
 }
 
+std::vector<int64_t> RevisionsOf(const Records& records) {
+  std::vector<int64_t> revisions;
+  for (const auto& [revision, bytes] : records) revisions.push_back(revision);
+  return revisions;
+}
+
+TEST_P(ConformanceTest, RecordsThatAreKeptOutliveTrimming) {
+  SessionStore& session = Create("part");
+  for (int64_t revision = 1; revision <= 9; ++revision) EXPECT_TRUE(AppendNow(session, revision, "x").ok());
+  Commit(session, 8, {});
+  const RecordRange kept[] = {{5, 6}, {1, 3}, {2, 3}, {7, 20}};
+  EXPECT_TRUE(session.TrimRecords(8, kept).ok());
+  const auto read = [](SessionStore& each, RecordRange range) {
+    Records records;
+    EXPECT_TRUE(each.ReadRecords(range,
+                                 [&](int64_t revision, absl::string_view bytes) {
+                                   records.emplace_back(revision, bytes);
+                                   return absl::OkStatus();
+                                 })
+                    .ok());
+    return RevisionsOf(records);
+  };
+  SessionStore& again = ReopenNamed("part");
+  EXPECT_THAT(read(again, {1, 3}), ElementsAre(2, 3));
+  EXPECT_THAT(read(again, {5, 6}), ElementsAre(6));
+  EXPECT_THAT(read(again, {7, INT64_MAX}), ElementsAre(8, 9));
+  const auto ignore = [](int64_t, absl::string_view) { return absl::OkStatus(); };
+  for (const RecordRange gone : {RecordRange{0, 1}, {0, 4}, {3, 5}, {1, 9}, {6, 7}}) {
+    EXPECT_EQ(ErrorReason(again.ReadRecords(gone, ignore)), reason::kStoreTrimmed) << gone.after;
+  }
+  EXPECT_TRUE(session_->TrimRecords(8).ok());
+  EXPECT_THAT(RevisionsOf(RecordsAfter(ReopenNamed("part"), 8)), ElementsAre(9));
+  EXPECT_EQ(ErrorReason(session_->ReadRecords({1, 3}, ignore)), reason::kStoreTrimmed);
+}
+
+void CommitKeeping(SessionStore& session, int64_t revision, const std::map<PageKey, std::string>& pages,
+                   absl::Span<const PageKey> dropped = {}) {
+  auto writer = session.BeginCheckpoint(revision);
+  ASSERT_EQ(writer.status(), absl::OkStatus());
+  for (const auto& [page, bytes] : pages) EXPECT_EQ((*writer)->WritePage(page, bytes), absl::OkStatus());
+  for (const PageKey page : dropped) EXPECT_EQ((*writer)->DropPage(page), absl::OkStatus());
+  EXPECT_EQ((*writer)->Commit(absl::StrCat("of ", revision), FormerCheckpoint::kKeep), absl::OkStatus());
+}
+
+TEST_P(ConformanceTest, AFormerCheckpointIsReadUntilItIsDropped) {
+  SessionStore& session = Create("part");
+  CommitKeeping(session, 1, {{1, "a"}, {2, "b"}, {3, "c"}});
+  CommitKeeping(session, 2, {{1, "A"}, {4, "d"}}, {{3}});
+  CommitKeeping(session, 3, {{3, "C"}}, {{4, 2}});
+  const std::vector<CheckpointContents> all = {{1, "of 1", {{1, "a"}, {2, "b"}, {3, "c"}}},
+                                               {2, "of 2", {{1, "A"}, {2, "b"}, {4, "d"}}},
+                                               {3, "of 3", {{1, "A"}, {3, "C"}}}};
+  SessionContents expected{3, "of 3", all[2].pages, {}, {all[0], all[1]}};
+  EXPECT_EQ(ContentsOf(session), expected);
+  SessionStore& again = ReopenNamed("part");
+  EXPECT_EQ(ContentsOf(again), expected);
+  const std::vector<Checkpoint> checkpoints = again.ListCheckpoints().value();
+  EXPECT_TRUE(again.DropCheckpoint(checkpoints[0].number).ok());
+  expected.former = {all[1]};
+  EXPECT_EQ(ContentsOf(again), expected);
+  EXPECT_EQ(ErrorReason(again.DropCheckpoint(checkpoints[0].number)), reason::kCheckpointNotFound);
+  EXPECT_EQ(ErrorReason(again.DropCheckpoint(checkpoints[2].number)), reason::kCheckpointNotFound)
+      << "the last";
+  for (const uint64_t number : {uint64_t{0}, checkpoints[0].number, checkpoints[2].number + 1, UINT64_MAX}) {
+    const auto none =
+        again.ReadCheckpoint(number, [](PageKey, absl::string_view) { return absl::OkStatus(); });
+    EXPECT_EQ(ErrorReason(none.status()), reason::kCheckpointNotFound) << number;
+  }
+  SessionStore& later = ReopenNamed("part");
+  EXPECT_EQ(ContentsOf(later), expected);
+  Commit(later, 4, {{9, "i"}});
+  EXPECT_EQ(ContentsOf(later),
+            (SessionContents{4, "manifest", {{1, "A"}, {3, "C"}, {9, "i"}}, {}, {all[1]}}));
+}
+
+TEST_P(ConformanceTest, NoCheckpointIsDroppedWhileOneIsMade) {
+  SessionStore& session = Create("part");
+  CommitKeeping(session, 1, {{1, "a"}});
+  CommitKeeping(session, 2, {{1, "A"}});
+  const uint64_t first = session.ListCheckpoints().value().front().number;
+  const auto writer = session.BeginCheckpoint(2);
+  EXPECT_EQ(ErrorReason(session.DropCheckpoint(first)), reason::kCheckpointOpen);
+}
+
 TEST_P(ConformanceTest, ACheckpointBeyondTheRecordsReplacesThem) {
   SessionStore& session = Create("part");
   EXPECT_TRUE(AppendNow(session, 1, "x").ok());

@@ -16,18 +16,35 @@ void PrintTo(const SessionContents& contents, std::ostream* out) {
   *out << ", records:";
   for (const auto& [revision, bytes] : contents.records)
     *out << ' ' << revision << '(' << bytes.size() << ')';
+  for (const CheckpointContents& former : contents.former) {
+    *out << ", former checkpoint " << former.revision << " with " << former.pages.size() << " pages";
+  }
 }
 
-absl::StatusOr<SessionContents> ReadSession(SessionStore& session) {
-  SessionContents contents;
+absl::StatusOr<CheckpointContents> ReadOne(SessionStore& session, uint64_t number) {
+  CheckpointContents contents;
   const auto on_page = [&](PageKey page, absl::string_view bytes) {
     EXPECT_TRUE(contents.pages.emplace(page, bytes).second) << page;
     return absl::OkStatus();
   };
-  DYNMESH_ASSIGN_OR_RETURN(const auto checkpoint, session.ReadCheckpoint(on_page));
-  if (checkpoint.has_value()) {
-    contents.checkpoint = checkpoint->revision;
-    contents.manifest = checkpoint->manifest;
+  DYNMESH_ASSIGN_OR_RETURN(const Checkpoint checkpoint, session.ReadCheckpoint(number, on_page));
+  contents.revision = checkpoint.revision;
+  contents.manifest = checkpoint.manifest;
+  return contents;
+}
+
+absl::StatusOr<SessionContents> ReadSession(SessionStore& session) {
+  SessionContents contents;
+  DYNMESH_ASSIGN_OR_RETURN(const std::vector<Checkpoint> checkpoints, session.ListCheckpoints());
+  for (const Checkpoint& checkpoint : checkpoints) {
+    DYNMESH_ASSIGN_OR_RETURN(contents.former.emplace_back(), ReadOne(session, checkpoint.number));
+  }
+  if (!contents.former.empty()) {
+    CheckpointContents last = std::move(contents.former.back());
+    contents.former.pop_back();
+    contents.checkpoint = last.revision;
+    contents.manifest = std::move(last.manifest);
+    contents.pages = std::move(last.pages);
   }
   const auto on_record = [&](int64_t revision, absl::string_view bytes) {
     contents.records.emplace_back(revision, bytes);
@@ -84,10 +101,12 @@ void RandomAuthor::Write(int num_steps) {
 }
 
 void RandomAuthor::Step(SessionStore& session, SessionContents& contents) {
-  switch (Below(6)) {
+  switch (Below(7)) {
     case 0:
       return MakeCheckpoint(session, contents);
     case 1:
+      return DropCheckpoint(session, contents);
+    case 2:
       EXPECT_EQ(session.TrimRecords(contents.checkpoint - Below(2)), absl::OkStatus());
       return;
     default:
@@ -111,8 +130,19 @@ void RandomAuthor::MakeCheckpoint(SessionStore& session, SessionContents& conten
   ChangePages(**writer, pages);
   if (Below(4) == 0) return;  // abandoned
   std::string manifest = AnyBytes();
-  contents = {revision, manifest, std::move(pages), {}};
-  EXPECT_EQ((*writer)->Commit(std::move(manifest)), absl::OkStatus());
+  std::vector<CheckpointContents> former = std::move(contents.former);
+  const bool keeps = Below(2) == 0 && !(*session.ListCheckpoints()).empty();
+  if (keeps) former.push_back({contents.checkpoint, contents.manifest, contents.pages});
+  contents = {revision, manifest, std::move(pages), {}, std::move(former)};
+  EXPECT_EQ((*writer)->Commit(std::move(manifest), keeps ? FormerCheckpoint::kKeep : FormerCheckpoint::kDrop),
+            absl::OkStatus());
+}
+
+void RandomAuthor::DropCheckpoint(SessionStore& session, SessionContents& contents) {
+  if (contents.former.empty()) return;
+  const size_t index = Below(static_cast<uint32_t>(contents.former.size()));
+  EXPECT_EQ(session.DropCheckpoint((*session.ListCheckpoints())[index].number), absl::OkStatus());
+  contents.former.erase(contents.former.begin() + index);
 }
 
 void RandomAuthor::ChangePages(CheckpointWriter& writer, std::map<PageKey, std::string>& pages) {

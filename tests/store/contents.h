@@ -17,12 +17,21 @@ namespace dynmesh::testing {
 
 using Records = std::vector<std::pair<int64_t, std::string>>;
 
+struct CheckpointContents {
+  int64_t revision = 0;
+  std::string manifest;
+  std::map<PageKey, std::string> pages;
+
+  bool operator==(const CheckpointContents&) const = default;
+};
+
 /// What a recovery of a session reads.
 struct SessionContents {
   int64_t checkpoint = 0;
   std::string manifest;
   std::map<PageKey, std::string> pages;
-  Records records;  ///< after the checkpoint
+  Records records;                              ///< after the checkpoint
+  std::vector<CheckpointContents> former = {};  ///< checkpoints that are kept
 
   bool operator==(const SessionContents&) const = default;
 };
@@ -52,6 +61,7 @@ class RandomAuthor {
   void Step(SessionStore& session, SessionContents& contents);
   void Append(SessionStore& session, SessionContents& contents);
   void MakeCheckpoint(SessionStore& session, SessionContents& contents);
+  void DropCheckpoint(SessionStore& session, SessionContents& contents);
   void ChangePages(CheckpointWriter& writer, std::map<PageKey, std::string>& pages);
   std::string AnyBytes() { return std::string(Below(300), static_cast<char>(Below(256))); }
   uint32_t Below(uint32_t end) { return (*random_)() % end; }

@@ -115,7 +115,7 @@ TEST_F(DamageTest, AMissingManifestIsFound) {
     const auto session = (*store)->OpenSession("left");
     EXPECT_TRUE((*session)->TrimRecords(2).ok());
   }
-  Tamper(Deletion(layout::ManifestKey(1)));
+  Tamper(Deletion(layout::ManifestKey(1, 1)));
   ExpectOnlyLeftIsDamaged();
 }
 
@@ -127,8 +127,8 @@ TEST_F(DamageTest, AValueInTheWrongPlaceIsFound) {
 
 TEST_F(DamageTest, ASealedValueThatMakesNoSenseIsFound) {
   Fill();
-  for (const std::string& key : {layout::ManifestKey(1), layout::TrimmedKey(1), layout::RecordKey(1, 3)}) {
-    const std::string before = Stored(layout::ManifestKey(1));
+  for (const std::string& key : {layout::ManifestKey(1, 1), layout::TrimmedKey(1), layout::RecordKey(1, 3)}) {
+    const std::string before = Stored(layout::ManifestKey(1, 1));
     Tamper(Replacement(key, layout::Seal(key, "short")));
     const auto store = Open();
     const auto left = (*store)->OpenSession("left");

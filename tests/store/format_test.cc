@@ -37,26 +37,36 @@ TEST(LayoutTest, WhatIsWrittenIsReadAgain) {
   const auto record = ReadRecord(record_payload);
   EXPECT_EQ(record->previous, 41);
   EXPECT_EQ(record->bytes, "bytes");
-  const std::string manifest_payload = WriteManifest({7, 8, 9, 10, "mine"});
+  const std::vector<PageVersion> pages = {{4, 7}, {UINT64_MAX, 1}};
+  const std::string manifest_payload = WriteManifest({8, pages, "mine"});
   const auto manifest = ReadManifest(manifest_payload);
-  EXPECT_EQ(manifest->checkpoint, 7u);
   EXPECT_EQ(manifest->revision, 8);
-  EXPECT_EQ(manifest->num_pages, 9u);
-  EXPECT_EQ(manifest->pages_hash, 10u);
+  EXPECT_EQ(manifest->pages, pages);
   EXPECT_EQ(manifest->bytes, "mine");
   EXPECT_EQ(*ReadNumber(WriteNumber(INT64_MAX)), uint64_t{INT64_MAX});
   const auto version = VersionOfKey(PageKeyOf(3, UINT64_MAX, 5));
   EXPECT_EQ(version->page, UINT64_MAX);
   EXPECT_EQ(version->checkpoint, 5u);
   EXPECT_EQ(*RevisionOfKey(RecordKey(1, INT64_MAX)), INT64_MAX);
-  EXPECT_EQ(*SessionOfKey(ManifestKey(77)), 77u);
+  EXPECT_EQ(*SessionOfKey(ManifestKey(77, 3)), 77u);
+  EXPECT_EQ(*CheckpointOfKey(ManifestKey(77, 3)), 3u);
+  EXPECT_TRUE(IsManifestKey(ManifestKey(77, 3)));
+  EXPECT_FALSE(IsManifestKey(PageKeyOf(77, 3, 3)));
+}
+
+TEST(LayoutTest, AManifestNamesEachPageOnceInOrder) {
+  for (const std::vector<PageVersion>& pages :
+       {std::vector<PageVersion>{{2, 1}, {1, 1}}, {{2, 1}, {2, 2}}, {{1, 0}}, {{1, UINT64_MAX}}}) {
+    EXPECT_EQ(ErrorReason(ReadManifest(WriteManifest({1, pages, ""})).status()), reason::kStoreDamaged);
+  }
 }
 
 TEST(LayoutTest, KeysSortAsTheirNumbersDo) {
   EXPECT_LT(RecordKey(1, 255), RecordKey(1, 256));
   EXPECT_LT(PageKeyOf(1, 1, 300), PageKeyOf(1, 2, 1));
-  EXPECT_LT(ManifestKey(1), PageKeyOf(1, 0, 1));
-  for (const std::string& key : {ManifestKey(5), PageKeyOf(5, UINT64_MAX, 1), RecordKey(5, INT64_MAX),
+  EXPECT_LT(ManifestKey(1, 255), ManifestKey(1, 256));
+  EXPECT_LT(ManifestKey(1, UINT64_MAX), PageKeyOf(1, 0, 1));
+  for (const std::string& key : {ManifestKey(5, 1), PageKeyOf(5, UINT64_MAX, 1), RecordKey(5, INT64_MAX),
                                  TrimmedKey(5), ValueKey(5, std::string(kMaxNameBytes, '\xff'))}) {
     EXPECT_TRUE(DataOf(5).from <= key && key < DataOf(5).to);
     EXPECT_TRUE(DataOfAll().from <= key && key < DataOfAll().to);
@@ -94,7 +104,8 @@ TEST(LayoutTest, BytesOfEveryLengthAreRefusedOrRead) {
       (void)VersionOfKey(bytes);
       EXPECT_EQ(ReadNumber(bytes).ok(), size == 8 && fill != '\xff');
       EXPECT_EQ(ReadRecord(bytes).ok(), size >= 8 && fill != '\xff');
-      EXPECT_EQ(ReadManifest(bytes).ok(), size >= 32 && fill != '\xff' && fill != '\0');
+      (void)CheckpointOfKey(bytes);
+      EXPECT_EQ(ReadManifest(bytes).ok(), size >= 16 && fill == '\0') << "other counts are too large";
     }
   }
 }

@@ -24,15 +24,16 @@ uint64_t MaxBytes(const Limits& limits) {
 
 absl::StatusOr<RecoveredSession> RecoverSession(SessionStore& store, const Limits& limits) {
   RecoveredSession recovered;
-  DYNMESH_ASSIGN_OR_RETURN(const absl::optional<Checkpoint> checkpoint, store.FindCheckpoint());
-  if (!checkpoint.has_value()) return StoreDamaged("the session has no checkpoint");
+  DYNMESH_ASSIGN_OR_RETURN(const std::vector<Checkpoint> checkpoints, store.ListCheckpoints());
+  if (checkpoints.empty()) return StoreDamaged("the session has no checkpoint");
+  const Checkpoint* const checkpoint = &checkpoints.back();
   DYNMESH_ASSIGN_OR_RETURN(const SessionManifest manifest, DecodeManifest(checkpoint->manifest));
   recovered.commit_time = manifest.commit_time;
   recovered.checkpoint_revision = checkpoint->revision;
   DYNMESH_ASSIGN_OR_RETURN(Rebuilder rebuilder,
                            Rebuilder::Start(manifest.head, {.max_memory_bytes = MaxBytes(limits)}));
   const auto add_page = [&](PageKey, absl::string_view bytes) { return rebuilder.AddPage(bytes); };
-  DYNMESH_RETURN_IF_ERROR(store.ReadCheckpoint(add_page).status());
+  DYNMESH_RETURN_IF_ERROR(store.ReadCheckpoint(checkpoint->number, add_page).status());
   const auto add_record = [&](int64_t revision, absl::string_view bytes) -> absl::Status {
     DYNMESH_ASSIGN_OR_RETURN(LogRecord record, DecodeLogRecord(bytes));
     recovered.records.push_back({revision, bytes.size()});
