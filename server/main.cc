@@ -39,6 +39,14 @@ ABSL_FLAG(absl::Duration, async_delay, dynmesh::ServerOptions().async_delay,
           "What a loss of power may take of sessions that are kept with DURABILITY_ASYNC");
 ABSL_FLAG(uint64_t, checkpoint_bytes, dynmesh::ServerOptions().checkpoint_bytes,
           "Log of a session before another checkpoint is written, which keeps loading it quick");
+ABSL_FLAG(absl::Duration, idle_timeout, dynmesh::ServerOptions().idle_timeout,
+          "Sessions in data_dir that nobody has used or followed for so long are unloaded, until somebody "
+          "uses them; "
+          "what undoes batches is lost. 0: never");
+ABSL_FLAG(uint64_t, max_loaded_bytes, dynmesh::ServerOptions().max_loaded_bytes,
+          "Memory of the sessions in data_dir that are loaded: beyond it the least recently used ones that "
+          "nobody uses "
+          "are unloaded. 0: however much");
 ABSL_FLAG(std::string, ready_file, "",
           "File that is written, one address a line, when the server is serving; removed at the end");
 ABSL_FLAG(std::string, log_level, "info", "trace, debug, info, warn, error or off");
@@ -165,6 +173,8 @@ ServerOptions OptionsFromFlags() {
   options.data_dir = absl::GetFlag(FLAGS_data_dir);
   options.async_delay = absl::GetFlag(FLAGS_async_delay);
   options.checkpoint_bytes = absl::GetFlag(FLAGS_checkpoint_bytes);
+  options.idle_timeout = absl::GetFlag(FLAGS_idle_timeout);
+  options.max_loaded_bytes = absl::GetFlag(FLAGS_max_loaded_bytes);
   options.limits = LimitsFromFlags();
   options.quick_threads = absl::GetFlag(FLAGS_quick_threads);
   options.heavy_threads = absl::GetFlag(FLAGS_heavy_threads);

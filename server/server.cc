@@ -28,6 +28,7 @@
 #include "server/rpc/repairs_service.h"
 #include "server/rpc/sessions_service.h"
 #include "server/rpc/subscriptions_service.h"
+#include "server/session/catch_exceptions.h"
 #include "server/session/session_errors.h"
 #include "server/store/local_store.h"
 #include "server/store/rocksdb_engine.h"
@@ -44,6 +45,9 @@ constexpr const char* kServiceNames[] = {"dynmesh.v1.SessionService",     "dynme
 constexpr uint64_t kHardMessageFactor = 4;
 // Followers, and a daemon that drains, wait for as long.
 constexpr absl::Duration kMaxAsyncDelay = absl::Seconds(10);
+// How often sessions are looked at that may be unloaded: an eighth of idle_timeout, within these bounds.
+constexpr absl::Duration kMinSweepPeriod = absl::Milliseconds(250);
+constexpr absl::Duration kMaxSweepPeriod = absl::Minutes(1);
 constexpr int kKeepaliveTimeMs = 30'000;
 constexpr int kKeepaliveTimeoutMs = 10'000;
 constexpr int kMinPingIntervalMs = 5'000;
@@ -118,12 +122,31 @@ int HeavyThreads(const ServerOptions& options) {
   return static_cast<int>(std::min(options.limits.max_concurrent_imports, 16u)) + 4;
 }
 
+UnloadPolicy PolicyOf(const ServerOptions& options) {
+  UnloadPolicy policy;
+  if (options.idle_timeout > absl::ZeroDuration()) policy.idle_timeout = options.idle_timeout;
+  if (options.max_loaded_bytes > 0) policy.max_loaded_bytes = options.max_loaded_bytes;
+  return policy;
+}
+
+/// Never where nothing is to be unloaded.
+absl::Duration SweepPeriod(const ServerOptions& options) {
+  if (options.data_dir.empty()) return absl::InfiniteDuration();
+  if (options.max_loaded_bytes > 0) return kMinSweepPeriod;
+  const absl::Duration idle = PolicyOf(options).idle_timeout;
+  if (idle == absl::InfiniteDuration()) return idle;
+  return std::clamp(idle / 8, kMinSweepPeriod, kMaxSweepPeriod);
+}
+
 /// Null without a directory.
 absl::StatusOr<std::unique_ptr<Store>> OpenStore(const ServerOptions& options) {
   if (options.data_dir.empty()) return std::unique_ptr<Store>();
   if (options.async_delay < absl::ZeroDuration() || options.async_delay > kMaxAsyncDelay) {
     return InvalidArgument(reason::kBadArgument, "async_delay is outside 0 to 10 s",
                            {{"field", "async_delay"}});
+  }
+  if (options.idle_timeout < absl::ZeroDuration()) {
+    return InvalidArgument(reason::kBadArgument, "idle_timeout is negative", {{"field", "idle_timeout"}});
   }
   DYNMESH_ASSIGN_OR_RETURN(std::unique_ptr<Engine> engine, OpenRocksDb({options.data_dir}));
   return LocalStore::Open(std::move(engine), {.async_delay = options.async_delay});
@@ -146,7 +169,9 @@ class Server::Impl {
       : quick_(ExecutorOptions("quick", QuickThreads(options), options.limits)),
         heavy_(ExecutorOptions("heavy", HeavyThreads(options), options.limits)),
         registry_(options.limits, Workers{&quick_, &heavy_, &timer_}, std::move(store),
-                  {.checkpoint_bytes = options.checkpoint_bytes}) {
+                  {.checkpoint_bytes = options.checkpoint_bytes}),
+        unload_policy_(PolicyOf(options)),
+        sweep_period_(SweepPeriod(options)) {
     const ServiceContext context{registry_, streams_};
     services_.push_back(MakeSessionsService(context));
     services_.push_back(MakeEditsService(context));
@@ -166,6 +191,8 @@ class Server::Impl {
 
   absl::Status Listen(const ServerOptions& options);
   void Drain(absl::Duration timeout);
+  /// From now on sessions are unloaded, as long as the timer runs.
+  void SweepLater();
   const std::vector<std::string>& addresses() const { return addresses_; }
   SessionRegistry& registry() { return registry_; }
 
@@ -177,6 +204,8 @@ class Server::Impl {
   Executor heavy_;
   OpenStreams streams_;
   SessionRegistry registry_;
+  const UnloadPolicy unload_policy_;
+  const absl::Duration sweep_period_;
   std::vector<std::unique_ptr<grpc::Service>> services_;
   Mutex drain_mu_;
   bool drained_ ABSL_GUARDED_BY(drain_mu_) = false;
@@ -222,6 +251,21 @@ absl::Status Server::Impl::Listen(const ServerOptions& options) {
   return absl::OkStatus();
 }
 
+// One at a time: the next is due after the last.
+void Server::Impl::SweepLater() {
+  if (sweep_period_ == absl::InfiniteDuration()) return;
+  timer_.RunAt(absl::Now() + sweep_period_, [this] {
+    heavy_.Post([this] {
+      const absl::Status swept = CatchExceptions([this] {
+        registry_.UnloadIdle(absl::Now(), unload_policy_);
+        return absl::OkStatus();
+      });
+      if (!swept.ok()) spdlog::error("unloading_failed error=\"{}\"", swept.ToString());
+      SweepLater();
+    });
+  });
+}
+
 void Server::Impl::Drain(absl::Duration timeout) {
   MutexLock lock(&drain_mu_);
   if (drained_ || grpc_ == nullptr) return;
@@ -250,6 +294,7 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(const ServerOptions& optio
   auto impl = std::make_unique<Impl>(options, std::move(store));
   DYNMESH_RETURN_IF_ERROR(impl->registry().AddStored());
   DYNMESH_RETURN_IF_ERROR(impl->Listen(options));
+  impl->SweepLater();
   return std::unique_ptr<Server>(new Server(std::move(impl)));
 }
 

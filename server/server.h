@@ -26,6 +26,10 @@ struct ServerOptions {
   absl::Duration async_delay = absl::Milliseconds(50);
   /// Records of a session of so many bytes make a checkpoint due, which keeps its loading short.
   uint64_t checkpoint_bytes = uint64_t{64} << 20;
+  /// Sessions in data_dir that nobody has used for so long are unloaded; zero: never.
+  absl::Duration idle_timeout = absl::Minutes(30);
+  /// When those that are loaded hold more, the least recently used ones are unloaded; 0: however much.
+  uint64_t max_loaded_bytes = 0;
   Limits limits;
   int quick_threads = 0;  ///< 0: four for each processor, at least 8
   int heavy_threads = 0;  ///< 0: four more than max_concurrent_imports

@@ -56,6 +56,9 @@ class AnswerMemory {
     }
   }
 
+  /// What the answers hold, about.
+  uint64_t bytes() const { return bytes_; }
+
  private:
   struct Entry {
     uint64_t fingerprint = 0;

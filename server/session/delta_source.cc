@@ -155,6 +155,16 @@ absl::StatusOr<PayloadPtr> DeltaSource::Make(const DeltaKey& key, AccessGrant& g
   return PayloadPtr(std::move(payload));
 }
 
+std::map<int, QuantizationGrid> DeltaSource::grids() const {
+  MutexLock lock(&grids_mu_);
+  return grids_;
+}
+
+void DeltaSource::KeepGrids(std::map<int, QuantizationGrid> grids) {
+  MutexLock lock(&grids_mu_);
+  grids_ = std::move(grids);
+}
+
 QuantizationGrid DeltaSource::GridFor(int bits, const SessionView& view) {
   MutexLock lock(&grids_mu_);
   const auto found = grids_.find(bits);

@@ -83,6 +83,10 @@ class DeltaSource {
   /// Drops the payloads that are kept, e.g. because nobody follows any more.
   void Forget();
 
+  /// Grids that are fixed, by number of bits: for the session that takes the place of an unloaded one.
+  std::map<int, QuantizationGrid> grids() const;
+  void KeepGrids(std::map<int, QuantizationGrid> grids);
+
   /// How many deltas have been encoded: for tests and statistics.
   uint64_t num_encodings() const { return num_encodings_.load(); }
 
@@ -110,7 +114,7 @@ class DeltaSource {
   Mutex mu_;
   std::vector<Pending> pending_ ABSL_GUARDED_BY(mu_);
   std::deque<Kept> kept_ ABSL_GUARDED_BY(mu_);
-  Mutex grids_mu_;
+  mutable Mutex grids_mu_;
   std::map<int, QuantizationGrid> grids_ ABSL_GUARDED_BY(grids_mu_);
   std::atomic<uint64_t> num_encodings_{0};
 };

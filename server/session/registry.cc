@@ -64,7 +64,7 @@ absl::StatusOr<SessionInfo> SessionRegistry::CreateOnce(const Creation& creation
                       sizeof(info));
   }
   MutexLock lock(&mu_);
-  sessions_[creation.name] = session;
+  sessions_[creation.name] = {session};
   spdlog::info("session_created name={} sessions={}", creation.name, sessions_.size());
   return info;
 }
@@ -137,7 +137,7 @@ absl::Status SessionRegistry::AddStored() {
       continue;
     }
     MutexLock lock(&mu_);
-    sessions_[name] = *session;
+    sessions_[name] = {*session};
   }
   return absl::OkStatus();
 }
@@ -167,13 +167,15 @@ absl::StatusOr<SessionPtr> SessionRegistry::OpenStored(const std::string& name) 
 
 // ---- Finding and deleting ----
 
-absl::StatusOr<SessionPtr> SessionRegistry::Find(absl::string_view name) const {
+absl::StatusOr<SessionPtr> SessionRegistry::Find(absl::string_view name) {
   DYNMESH_RETURN_IF_ERROR(CheckSessionName(name));
   MutexLock lock(&mu_);
   const auto found = sessions_.find(Key(name));
   if (found == sessions_.end()) return SessionNotFound(name);
-  found->second->EnsureLoaded();
-  return found->second;
+  Entry& entry = found->second;
+  entry.last_used = absl::Now();
+  entry.session->EnsureLoaded();
+  return entry.session;
 }
 
 std::vector<SessionPtr> SessionRegistry::ListAfter(absl::string_view after, size_t max_sessions) const {
@@ -181,7 +183,7 @@ std::vector<SessionPtr> SessionRegistry::ListAfter(absl::string_view after, size
   MutexLock lock(&mu_);
   for (auto it = sessions_.upper_bound(Key(after)); it != sessions_.end() && page.size() < max_sessions;
        ++it) {
-    page.push_back(it->second);
+    page.push_back(it->second.session);
   }
   return page;
 }
@@ -206,7 +208,7 @@ void SessionRegistry::Drain() {
   {
     MutexLock lock(&mu_);
     draining_ = true;
-    for (const auto& [name, session] : sessions_) sessions.push_back(session);
+    for (const auto& [name, entry] : sessions_) sessions.push_back(entry.session);
   }
   for (const SessionPtr& session : sessions) session->followers().Close(ShuttingDown());
 }

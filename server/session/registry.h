@@ -1,7 +1,9 @@
 #ifndef DYNMESH_SERVER_SESSION_REGISTRY_H_
 #define DYNMESH_SERVER_SESSION_REGISTRY_H_
 
+#include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <memory>
 #include <string>
@@ -11,6 +13,8 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
+#include "absl/time/clock.h"
+#include "absl/time/time.h"
 #include "server/session/answer_memory.h"
 #include "server/session/budget.h"
 #include "server/session/durability/manifest.h"
@@ -23,7 +27,19 @@
 
 namespace dynmesh {
 
+/// When sessions are unloaded: see SessionRegistry::UnloadIdle().
+struct UnloadPolicy {
+  absl::Duration idle_timeout = absl::InfiniteDuration();            ///< that nobody has used it
+  uint64_t max_loaded_bytes = std::numeric_limits<uint64_t>::max();  ///< of all that could be unloaded
+};
+
 /// The sessions of a daemon by name.
+///
+/// A session that a store has is loaded when it is found, and unloaded again when UnloadIdle() is called and
+/// nobody uses it. Whoever has a SessionPtr uses a session: a call, a follower, an edit that is not
+/// acknowledged yet.
+///
+///     kStored -- Find() --> loading --> kLoaded -- UnloadIdle() --> kStored: another Session, the same log
 ///
 /// Thread safety: full. Its lock is held for look-ups only, never while a session works or the disk.
 class SessionRegistry {
@@ -53,10 +69,18 @@ class SessionRegistry {
                                      const std::string& request_id);
 
   /// Calls Session::EnsureLoaded(). Errors: NOT_FOUND SESSION_NOT_FOUND.
-  absl::StatusOr<SessionPtr> Find(absl::string_view name) const;
+  absl::StatusOr<SessionPtr> Find(absl::string_view name);
 
   /// Up to `max_sessions` sessions with names after `after`, sorted by name.
   std::vector<SessionPtr> ListAfter(absl::string_view after, size_t max_sessions) const;
+
+  /// Unloads sessions that nobody uses, those found longest ago first: those that nobody has used for
+  /// idle_timeout, and while all that are stored and loaded hold more than max_loaded_bytes, those that rest
+  /// for a second. Where loading would have much log to read, a checkpoint is begun instead, and a later call
+  /// unloads. Followers and answers to requests stay what they were; what undoes batches is lost, as by a
+  /// restart. Returns how many were unloaded. To be called again and again by one thread that may take its
+  /// time. `now` is absl::Now(), or a later time in tests.
+  size_t UnloadIdle(absl::Time now, const UnloadPolicy& policy) ABSL_LOCKS_EXCLUDED(mu_);
 
   /// Deletes a session and ends what follows it; returns its last revision.
   /// Errors: NOT_FOUND SESSION_NOT_FOUND; ABORTED ETAG_MISMATCH.
@@ -79,6 +103,15 @@ class SessionRegistry {
 
  private:
   struct Creation;
+  struct Entry {
+    SessionPtr session;
+    absl::Time last_used = absl::Now();
+  };
+  struct Unloaded {
+    SessionPtr session;
+    uint64_t bytes;
+    absl::Duration idle;
+  };
 
   absl::StatusOr<SessionInfo> CreateOnce(const Creation& creation) ABSL_EXCLUSIVE_LOCKS_REQUIRED(create_mu_);
   absl::Status CheckCreation(const std::string& name) const ABSL_LOCKS_EXCLUDED(mu_);
@@ -87,6 +120,13 @@ class SessionRegistry {
                                                       const SessionIdentity& identity);
   absl::StatusOr<SessionPtr> OpenStored(const std::string& name) ABSL_EXCLUSIVE_LOCKS_REQUIRED(create_mu_);
   std::unique_ptr<SessionLog> LogFor(std::unique_ptr<SessionStore> store, SessionDurability durability) const;
+
+  // registry_unloading.cc
+  /// Puts others in the place of those that are to go, which nobody can find any more.
+  std::vector<Unloaded> TakeIdle(absl::Time now, const UnloadPolicy& policy) ABSL_LOCKS_EXCLUDED(mu_);
+  /// What can be unloaded, the least recently used first; notes what is used, and what all that is loaded
+  /// holds.
+  std::vector<Entry*> FindIdle(absl::Time now, uint64_t& loaded_bytes) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
 
   const Limits limits_;
   const Workers workers_;
@@ -97,7 +137,7 @@ class SessionRegistry {
   const std::shared_ptr<Budget> adaptation_budget_;
   Mutex create_mu_;  ///< held while a session is created, which may wait for the disk
   mutable Mutex mu_;
-  std::map<std::string, SessionPtr, std::less<>> sessions_ ABSL_GUARDED_BY(mu_);
+  std::map<std::string, Entry, std::less<>> sessions_ ABSL_GUARDED_BY(mu_);
   AnswerMemory<SessionInfo> created_ ABSL_GUARDED_BY(create_mu_);
   bool draining_ ABSL_GUARDED_BY(mu_) = false;
 };

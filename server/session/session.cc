@@ -118,7 +118,7 @@ absl::Status CheckSessionName(absl::string_view name) {
       {{"field", "name"}});
 }
 
-Session::Session(const Options& options, std::unique_ptr<SessionLog> log, Content content)
+Session::Session(const Options& options, std::shared_ptr<SessionLog> log, Content content)
     : options_(options),
       uid_(options.uid.empty() ? NewUid() : options.uid),
       create_time_(options.create_time),
@@ -126,6 +126,7 @@ Session::Session(const Options& options, std::unique_ptr<SessionLog> log, Conten
       mesh_(MeshOptions{options.settings.duplicates, ToMeshLimits(options.limits)}),
       commit_time_(create_time_),
       history_(options.limits),
+      num_updates_(options.num_updates),
       checks_(options.settings.checks),
       spatial_(options.limits.max_session_bytes),
       followers_(std::make_shared<FollowerList>(options.limits.max_followers)),
@@ -138,12 +139,14 @@ Session::Session(const Options& options, std::unique_ptr<SessionLog> log, Conten
     state_ = SessionState::kDamaged;
   }
   if (log_ == nullptr) return;
-  log_->WatchDurable([followers = followers_] { followers->Wake(); });
-  if (content == Content::kEmpty) return;
-  gone_ = SessionLoading(name());
-  revision_ = log_->durable_revision();
-  state_ = SessionState::kStored;
-  load_begun_ = false;
+  if (content == Content::kStored) {
+    gone_ = SessionLoading(name());
+    revision_ = log_->durable_revision();
+    state_ = SessionState::kStored;
+    load_begun_ = false;
+  }
+  log_->WatchDurable(
+      [followers = followers_] { followers->Wake(); });  // last: another session may have had it
 }
 
 Session::~Session() = default;
@@ -354,6 +357,7 @@ void Session::MakeRoom(uint64_t mesh_bytes) {
   if (mesh_bytes + spatial_.memory_bytes() + history_.memory_bytes() > max_bytes) spatial_.Clear();
   history_.ShrinkTo(max_bytes - std::min(mesh_bytes, max_bytes));
   CountHistory();
+  measured_bytes_ = mesh_bytes + answers_.bytes() + history_answers_.bytes();
 }
 
 void Session::CountHistory() {

@@ -113,6 +113,9 @@ class Session : public std::enable_shared_from_this<Session> {
     // Of the request that created it, which its log's store remembers.
     std::string create_request_id = {};
     uint64_t create_fingerprint = 0;
+    // Of one that was loaded before.
+    absl::optional<absl::Time> update_time = absl::nullopt;
+    uint64_t num_updates = 0;                ///< of settings, which etags tell of
     absl::Status damage = absl::OkStatus();  ///< why what is stored cannot be had, if so
   };
 
@@ -120,7 +123,7 @@ class Session : public std::enable_shared_from_this<Session> {
   enum class Content { kEmpty, kStored };
 
   /// Without a log it ends with the process.
-  explicit Session(const Options& options, std::unique_ptr<SessionLog> log = nullptr,
+  explicit Session(const Options& options, std::shared_ptr<SessionLog> log = nullptr,
                    Content content = Content::kEmpty);
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
@@ -149,6 +152,27 @@ class Session : public std::enable_shared_from_this<Session> {
   /// Until then, and where it cannot be read, calls fail with UNAVAILABLE SESSION_LOADING or DATA_LOSS.
   /// Never waits.
   void EnsureLoaded();
+
+  /// What unloading would give back: mesh, indices, history and answers, as they were measured last. Never
+  /// waits.
+  uint64_t loaded_bytes() const { return measured_bytes_ + spatial_.memory_bytes() + history_bytes_; }
+  /// Whether a checkpoint is under way, which keeps a reference to this. Never waits.
+  bool writes_checkpoint() const { return writes_checkpoint_; }
+
+  // Unloading (session_unloading.cc). All four are for whoever knows that nobody else has a reference to
+  // this, nor can get one meanwhile: then none of them waits.
+
+  /// Whether the store has all that this is, but for what undoes batches. Not before the first revision:
+  /// there is nothing to free.
+  bool CanUnload() const ABSL_LOCKS_EXCLUDED(mu_);
+  /// Begins a checkpoint where loading would have much log to read; false when there is no need, or when one
+  /// was tried at this revision.
+  bool BeginLastCheckpoint();
+  /// Makes loaded_bytes() exact.
+  void MeasureMemory() ABSL_LOCKS_EXCLUDED(mu_, repairs_mu_);
+  /// The session that takes the place of this one: it is kStored, and shares the log. Destroy this soon.
+  /// REQUIRES: CanUnload().
+  std::shared_ptr<Session> Unload() ABSL_LOCKS_EXCLUDED(mu_);
 
   /// Calls `done` once the edit that made `revision` may be acknowledged: at once without a log, else as its
   /// durability says. Errors: what the store says against it; then nobody knows whether it will be there
@@ -325,15 +349,20 @@ class Session : public std::enable_shared_from_this<Session> {
   absl::Status StoreImport(const Mesh& mesh) ABSL_LOCKS_EXCLUDED(mu_);
   absl::Status StoreIdentity() ABSL_LOCKS_EXCLUDED(mu_);
 
+  // session_unloading.cc
+  AnswerMemory<ImportOutcome> CopyImports() const ABSL_LOCKS_EXCLUDED(imports_mu_);
+  void KeepImports(AnswerMemory<ImportOutcome> imports) ABSL_LOCKS_EXCLUDED(imports_mu_);
+
   const Options options_;
   const std::string uid_;
   const absl::Time create_time_;
   const std::shared_ptr<AccessQueue> access_ = std::make_shared<AccessQueue>();
-  const std::unique_ptr<SessionLog> log_;
+  const std::shared_ptr<SessionLog> log_;  ///< shared with the one that this takes the place of, which goes
   std::atomic<SessionState> state_{SessionState::kLoaded};
   std::atomic<bool> load_begun_{true};
   std::atomic<bool> load_failed_{false};
   std::atomic<bool> writes_checkpoint_{false};
+  std::atomic<int64_t> last_checkpoint_tried_{-1};  ///< by BeginLastCheckpoint(): the revision
 
   mutable SharedMutex mu_;
   Mesh mesh_ ABSL_GUARDED_BY(mu_);
@@ -345,11 +374,12 @@ class Session : public std::enable_shared_from_this<Session> {
   History history_ ABSL_GUARDED_BY(mu_);
   AnswerMemory<HistoryResult> history_answers_ ABSL_GUARDED_BY(mu_);
   std::atomic<int64_t> revision_{0};
-  std::atomic<uint64_t> num_updates_{0};  ///< of settings
+  std::atomic<uint64_t> num_updates_;  ///< of settings
   std::array<std::atomic<uint32_t>, kNumEntityKinds> num_live_ = {};
   std::atomic<uint32_t> num_undoable_{0}, num_redoable_{0};
   std::array<std::atomic<uint64_t>, 2> num_history_items_ = {};
   std::atomic<uint64_t> history_bytes_{0};
+  std::atomic<uint64_t> measured_bytes_{0};  ///< mesh and answers
 
   Mutex identity_mu_;  ///< held while the identity is stored
   mutable Mutex settings_mu_;

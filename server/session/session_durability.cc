@@ -83,6 +83,7 @@ absl::Status Session::LoadLocked(RecoveredSession& recovered) {
   mesh_ = std::move(recovered.mesh);
   Committed();
   commit_time_ = recovered.commit_time;
+  measured_bytes_ = mesh_.memory_bytes();
   return absl::OkStatus();
 }
 
@@ -111,7 +112,7 @@ SessionInfo Session::Outline() const {
   info.durable_revision = durable_revision();
   info.settings = options_.settings;
   info.create_time = create_time_;
-  info.update_time = create_time_;
+  info.update_time = options_.update_time.value_or(create_time_);
   info.etag = EtagAt(info.revision);
   if (info.state != SessionState::kDamaged) return info;  // nobody holds the lock of a damaged one for long
   ReaderMutexLock lock(&mu_);

@@ -34,7 +34,7 @@ enum class SessionDurability : uint8_t {
 /// Whether a session's content is in memory.
 enum class SessionState : uint8_t {
   kLoaded,
-  kStored,   ///< it is read from the store when somebody uses the session
+  kStored,   ///< not yet, or no more: it is read from the store when somebody uses the session
   kDamaged,  ///< it cannot be read; the session can only be deleted
 };
 

@@ -13,7 +13,7 @@
 namespace dynmesh::testing {
 
 /// What stays when a daemon of a test ends: stores on it find what earlier ones have written. Writes can be
-/// held up, and made to fail.
+/// held up, and made to fail, reads as well.
 class Medium {
  public:
   /// One at a time.
@@ -37,6 +37,11 @@ class Medium {
     MutexLock lock(&mu_);
     sync_failure_ = status;
   }
+  /// From now on nothing can be read; OK: everything again.
+  void FailReads(const absl::Status& status) {
+    MutexLock lock(&mu_);
+    read_failure_ = status;
+  }
   /// From now on all writes fail; OK: no more.
   void Fail(const absl::Status& status) {
     MutexLock lock(&mu_);
@@ -55,10 +60,13 @@ class Medium {
       return admitted.ok() ? medium_.memory_.Write(batch, sync) : admitted;
     }
     absl::StatusOr<absl::optional<std::string>> Get(absl::string_view key) const override {
+      const absl::Status readable = medium_.read_failure();
+      if (!readable.ok()) return readable;
       return medium_.memory_.Get(key);
     }
     absl::Status Scan(absl::string_view from, absl::string_view to, Visitor visit) const override {
-      return medium_.memory_.Scan(from, to, visit);
+      const absl::Status readable = medium_.read_failure();
+      return readable.ok() ? medium_.memory_.Scan(from, to, visit) : readable;
     }
     absl::StatusOr<absl::optional<std::string>> LastKey(absl::string_view from,
                                                         absl::string_view to) const override {
@@ -68,6 +76,11 @@ class Medium {
    private:
     Medium& medium_;
   };
+
+  absl::Status read_failure() {
+    MutexLock lock(&mu_);
+    return read_failure_;
+  }
 
   absl::Status Admit(Engine::Sync sync) {
     MutexLock lock(&mu_);
@@ -81,6 +94,7 @@ class Medium {
   bool held_ ABSL_GUARDED_BY(mu_) = false;
   absl::Status failure_ ABSL_GUARDED_BY(mu_);
   absl::Status sync_failure_ ABSL_GUARDED_BY(mu_);
+  absl::Status read_failure_ ABSL_GUARDED_BY(mu_);
 };
 
 }  // namespace dynmesh::testing

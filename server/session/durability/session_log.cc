@@ -157,6 +157,15 @@ void SessionLog::NoteStored(const std::vector<StoredRecord>& records, int64_t ch
   bytes_since_checkpoint_ = since;
 }
 
+void SessionLog::Rest() {
+  std::string().swap(batch_);
+  encoder_ = RecordEncoder();
+  MutexLock lock(&mu_);
+  dirty_ = DirtyPages();
+  records_ = std::deque<StoredRecord>();
+  record_bytes_ = 0;
+}
+
 int64_t SessionLog::TakeSuperfluous(int64_t revision) {
   MutexLock lock(&mu_);
   int64_t last = 0;

@@ -59,7 +59,8 @@ class SessionLog final : public BatchKeeper {
   /// The store holds what the session is. Waiters are called on threads of `executor`.
   SessionLog(std::unique_ptr<SessionStore> store, const SessionLogOptions& options, Executor* executor);
 
-  /// Calls `watcher` on a thread of the executor whenever more revisions are durable. Call it once, early.
+  /// Calls `watcher` on a thread of the executor whenever more revisions are durable, in place of the one
+  /// before. Call it before anybody waits for that.
   void WatchDurable(absl::AnyInvocable<void()> watcher);
 
   /// Encodes what the open batch did. Errors: those of status(); RESOURCE_EXHAUSTED LIMIT_EXCEEDED
@@ -84,11 +85,17 @@ class SessionLog final : public BatchKeeper {
   /// has not as they are. To be called before anything is appended.
   void NoteStored(const std::vector<StoredRecord>& records, int64_t checkpoint, const DirtyPages& changed);
 
+  /// The session is unloaded: frees what NoteStored() brings back. For whoever has the session's writer lock,
+  /// when no checkpoint is under way.
+  void Rest();
+
   /// Makes `mesh`, which no records lead to, what the store holds. Blocks until it is on disk.
   absl::Status StoreAll(const Mesh& mesh, absl::Time commit_time);
 
   /// Whether records have come to so much since the last checkpoint that another one is due.
   bool IsCheckpointDue() const { return bytes_since_checkpoint_ > options_.checkpoint_bytes; }
+  /// Whether it is much to read again, so that a session had better write one before it is unloaded.
+  bool IsLongSinceCheckpoint() const { return bytes_since_checkpoint_ > options_.checkpoint_bytes / 8; }
   /// Writes the pages that batches have touched since the last one, between edits, and trims records. Blocks
   /// until it is on disk.
   absl::Status WriteCheckpoint(Reader read);

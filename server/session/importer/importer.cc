@@ -1,15 +1,12 @@
 #include "server/session/importer/importer.h"
 
-#ifdef __GLIBC__
-#include <malloc.h>
-#endif
-
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "absl/time/clock.h"
 #include "server/session/answer_memory.h"
 #include "server/session/fingerprint.h"
+#include "server/session/heap.h"
 #include "server/session/session_errors.h"
 #include "spdlog/spdlog.h"
 
@@ -34,13 +31,6 @@ absl::Status CheckAnnouncedCount(absl::string_view what, uint64_t announced, uin
                          {{"field", absl::StrCat("num_", what)},
                           {"expected", absl::StrCat(announced)},
                           {"actual", absl::StrCat(received)}});
-}
-
-/// Gives the freed pieces back to the system, so that staging does not count against a daemon for ever.
-void TrimHeap() {
-#ifdef __GLIBC__
-  malloc_trim(0);
-#endif
 }
 
 }  // namespace
@@ -112,6 +102,7 @@ absl::Status Importer::CheckCounts() const {
 // With the relations that the session stores, so that Adopt() need not fill them under its lock.
 absl::StatusOr<Mesh> Importer::Build(MeshBuilder& builder) {
   DYNMESH_ASSIGN_OR_RETURN(Mesh mesh, builder.Build(std::move(staged_)));
+  session_->access().Acquire(AccessMode::kRead).Release();  // it may still be loading
   DYNMESH_ASSIGN_OR_RETURN(const std::vector<Relation> stored,
                            session_->ReadAs<std::vector<Relation>>([](const SessionView& view) {
                              return absl::StatusOr<std::vector<Relation>>(StoredRelationsOf(view.mesh));

@@ -121,6 +121,8 @@ def launch(
     *,
     listen: str | None = None,
     data_dir: PathLike | None = None,
+    idle_timeout: float | None = None,
+    max_loaded_bytes: int | None = None,
     flags: Sequence[str] = (),
     timeout: float = 30.0,
     grace: float = 10.0,
@@ -139,6 +141,12 @@ def launch(
         Serve at "host:port" as well; port 0 means any free one (see `Daemon.addresses`).
     data_dir : path, optional
         Keep sessions there, made if it is not there: whoever launches with the same one has them again.
+    idle_timeout : float, optional
+        Seconds after which sessions in `data_dir` that nobody uses or follows are unloaded, until somebody uses
+        them; their undo history is lost then. 0: never. Default: the daemon's own, half an hour.
+    max_loaded_bytes : int, optional
+        Memory of the sessions in `data_dir` that are loaded: beyond it the least recently used ones are unloaded.
+        0 and default: however much.
     flags : sequence of str
         Further flags of dynmeshd.
     timeout : float
@@ -161,6 +169,8 @@ def launch(
         f"--listen={listen or ''}",
         "--exit_with_parent",
         *([] if data_dir is None else [f"--data_dir={Path(data_dir).absolute()}"]),
+        *([] if idle_timeout is None else [f"--idle_timeout={idle_timeout:f}s"]),
+        *([] if max_loaded_bytes is None else [f"--max_loaded_bytes={max_loaded_bytes:d}"]),
         *flags,
     ]
     daemon = Daemon(_start(arguments, directory), directory, grace)
