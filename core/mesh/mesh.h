@@ -82,6 +82,8 @@ class Mesh {
   // ---- Size, liveness, revisions ----
 
   const MeshOptions& options() const { return options_; }
+  /// From now on as many slots are used at most; those in use stay, be they more.
+  void SetLimits(const MeshLimits& limits) { options_.limits = limits; }
   int64_t revision() const { return revision_; }
   const Slots& slots(EntityKind kind) const { return slots_[Dimension(kind)]; }
   uint32_t NumLive(EntityKind kind) const { return slots(kind).num_live(); }

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "server/session/catch_exceptions.h"
 #include "server/session/fingerprint.h"
 #include "server/session/session_errors.h"
 #include "spdlog/spdlog.h"
@@ -27,45 +28,73 @@ uint64_t FingerprintOf(const std::string& name, const SessionSettings& settings)
 // std::map finds by any type that compares with its keys, which absl's and std's string_view do not.
 std::string Key(absl::string_view name) { return std::string(name); }
 
-}  // namespace
+SessionIdentity IdentityOf(const Session::Options& options) {
+  return {options.uid,
+          options.create_time,
+          options.settings,
+          options.create_request_id,
+          options.create_fingerprint,
+          options.create_revision};
+}
 
-/// What somebody wants to create.
-struct SessionRegistry::Creation {
-  std::string name;
-  SessionSettings settings;
-  std::string request_id;
-  uint64_t fingerprint;
-};
+}  // namespace
 
 // ---- Creating ----
 
 absl::StatusOr<SessionInfo> SessionRegistry::Create(const std::string& name, const SessionSettings& settings,
                                                     const std::string& request_id) {
-  DYNMESH_RETURN_IF_ERROR(CheckSessionName(name));
-  DYNMESH_RETURN_IF_ERROR(CheckRequestId(request_id));
-  Creation creation{name, settings, request_id, FingerprintOf(name, settings)};
-  if (settings.durability == SessionDurability::kDefault) {
-    creation.settings.durability = store_ == nullptr ? SessionDurability::kNone : SessionDurability::kSync;
-  }
-  MutexLock lock(&create_mu_);
-  return CreateOnce(creation);
+  const absl::Time now = absl::Now();
+  return CreateFrom({.name = name,
+                     .settings = settings,
+                     .mesh = Mesh(MeshOptions{settings.duplicates, ToMeshLimits(limits_)}),
+                     .commit_time = now,
+                     .create_time = now,
+                     .request_id = request_id,
+                     .fingerprint = FingerprintOf(name, settings)});
 }
 
-absl::StatusOr<SessionInfo> SessionRegistry::CreateOnce(const Creation& creation) {
-  if (!creation.request_id.empty()) {
-    DYNMESH_ASSIGN_OR_RETURN(const auto remembered, created_.Find(creation.request_id, creation.fingerprint));
+absl::StatusOr<SessionInfo> SessionRegistry::CreateFrom(SessionSeed seed) {
+  DYNMESH_RETURN_IF_ERROR(CheckSessionName(seed.name));
+  DYNMESH_RETURN_IF_ERROR(CheckRequestId(seed.request_id));
+  DYNMESH_RETURN_IF_ERROR(Prepare(seed));
+  MutexLock lock(&create_mu_);
+  return CreateOnce(seed);
+}
+
+/// Makes the mesh one of this daemon.
+absl::Status SessionRegistry::Prepare(SessionSeed& seed) const {
+  for (EntityKind kind : kEntityKinds) {
+    const uint32_t max_slots = limits_.max_slots(kind), slots = seed.mesh.slots(kind).limit();
+    if (slots > max_slots) return LimitExceeded(kSlotLimitNames[Dimension(kind)], max_slots, slots);
+  }
+  seed.mesh.SetLimits(ToMeshLimits(limits_));
+  DYNMESH_RETURN_IF_ERROR(StoreJust(seed.mesh, seed.settings.stored_relations, limits_.max_session_bytes));
+  const uint64_t bytes = seed.mesh.memory_bytes();
+  if (bytes > limits_.max_session_bytes) {
+    return LimitExceeded("max_session_bytes", limits_.max_session_bytes, bytes);
+  }
+  seed.settings.duplicates = seed.mesh.options().duplicates;
+  if (seed.settings.durability == SessionDurability::kDefault) {
+    seed.settings.durability = store_ == nullptr ? SessionDurability::kNone : SessionDurability::kSync;
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<SessionInfo> SessionRegistry::CreateOnce(SessionSeed& seed) {
+  if (!seed.request_id.empty()) {
+    DYNMESH_ASSIGN_OR_RETURN(const auto remembered, created_.Find(seed.request_id, seed.fingerprint));
     if (remembered != nullptr) return *remembered;
   }
-  DYNMESH_RETURN_IF_ERROR(CheckCreation(creation.name));
-  DYNMESH_ASSIGN_OR_RETURN(const SessionPtr session, MakeSession(creation));
+  DYNMESH_RETURN_IF_ERROR(CheckCreation(seed.name));
+  DYNMESH_ASSIGN_OR_RETURN(const SessionPtr session, MakeSession(seed));
   DYNMESH_ASSIGN_OR_RETURN(SessionInfo info, session->Info());
-  if (!creation.request_id.empty()) {
-    created_.Remember(creation.request_id, creation.fingerprint, std::make_shared<const SessionInfo>(info),
+  if (!seed.request_id.empty()) {
+    created_.Remember(seed.request_id, seed.fingerprint, std::make_shared<const SessionInfo>(info),
                       sizeof(info));
   }
   MutexLock lock(&mu_);
-  sessions_[creation.name] = {session};
-  spdlog::info("session_created name={} sessions={}", creation.name, sessions_.size());
+  sessions_[seed.name] = {session};
+  spdlog::info("session_created name={} revision={} sessions={}", seed.name, info.revision, sessions_.size());
   return info;
 }
 
@@ -80,33 +109,37 @@ absl::Status SessionRegistry::CheckCreation(const std::string& name) const {
   return LimitExceeded("max_sessions", limits_.max_sessions, sessions_.size() + 1);
 }
 
-absl::StatusOr<SessionPtr> SessionRegistry::MakeSession(const Creation& creation) {
-  const Session::Options options{creation.name, creation.settings, limits_, workers_};
-  if (creation.settings.durability == SessionDurability::kNone) return std::make_shared<Session>(options);
-  if (store_ == nullptr) return NoStore();
-  SessionIdentity identity{Session::NewUid(), absl::Now(), creation.settings, creation.request_id,
-                           creation.fingerprint};
-  absl::StatusOr<std::unique_ptr<SessionLog>> log = MakeLog(creation.name, identity);
-  if (!log.ok()) {
-    if (!absl::IsAlreadyExists(log.status())) store_->DeleteSession(creation.name).IgnoreError();
-    return log.status();
+absl::StatusOr<SessionPtr> SessionRegistry::MakeSession(SessionSeed& seed) {
+  Session::Options options{seed.name, seed.settings, limits_, workers_};
+  options.uid = Session::NewUid();
+  options.create_time = seed.create_time;
+  options.create_request_id = seed.request_id;
+  options.create_fingerprint = seed.fingerprint;
+  options.create_revision = seed.mesh.revision();
+  std::unique_ptr<SessionLog> log;
+  if (seed.settings.durability != SessionDurability::kNone) {
+    DYNMESH_ASSIGN_OR_RETURN(log, MakeLog(seed, IdentityOf(options)));
   }
-  Session::Options kept = options;
-  kept.uid = identity.uid;
-  kept.create_time = identity.create_time;
-  kept.create_request_id = creation.request_id;
-  kept.create_fingerprint = creation.fingerprint;
-  return std::make_shared<Session>(kept, *std::move(log));
+  auto session = std::make_shared<Session>(options, std::move(log));
+  session->BeginWith(std::move(seed.mesh), seed.commit_time);
+  return session;
+}
+
+absl::StatusOr<std::unique_ptr<SessionLog>> SessionRegistry::MakeLog(const SessionSeed& seed,
+                                                                     const SessionIdentity& identity) {
+  if (store_ == nullptr) return NoStore();
+  auto log = CatchExceptions([&] { return StoreSeed(seed, identity); });
+  if (!log.ok() && !absl::IsAlreadyExists(log.status())) store_->DeleteSession(seed.name).IgnoreError();
+  return log;
 }
 
 /// The identity comes last: a session without one was never created.
-absl::StatusOr<std::unique_ptr<SessionLog>> SessionRegistry::MakeLog(const std::string& name,
-                                                                     const SessionIdentity& identity) {
-  DYNMESH_RETURN_IF_ERROR(store_->CreateSession(name));
-  DYNMESH_ASSIGN_OR_RETURN(std::unique_ptr<SessionStore> store, store_->OpenSession(name));
+absl::StatusOr<std::unique_ptr<SessionLog>> SessionRegistry::StoreSeed(const SessionSeed& seed,
+                                                                       const SessionIdentity& identity) {
+  DYNMESH_RETURN_IF_ERROR(store_->CreateSession(seed.name));
+  DYNMESH_ASSIGN_OR_RETURN(std::unique_ptr<SessionStore> store, store_->OpenSession(seed.name));
   std::unique_ptr<SessionLog> log = LogFor(std::move(store), identity.settings.durability);
-  const Mesh empty(MeshOptions{identity.settings.duplicates, ToMeshLimits(limits_)});
-  DYNMESH_RETURN_IF_ERROR(log->StoreAll(empty, identity.create_time));
+  DYNMESH_RETURN_IF_ERROR(log->StoreAll(seed.mesh, seed.commit_time));
   DYNMESH_RETURN_IF_ERROR(log->store().PutValue(kIdentityName, EncodeIdentity(identity)));
   return log;
 }
@@ -153,12 +186,13 @@ absl::StatusOr<SessionPtr> SessionRegistry::OpenStored(const std::string& name) 
   options.create_time = identity.create_time;
   options.create_request_id = identity.request_id;
   options.create_fingerprint = identity.fingerprint;
+  options.create_revision = identity.create_revision;
   SessionPtr session = std::make_shared<Session>(
       options, LogFor(std::move(store), identity.settings.durability), Session::Content::kStored);
   if (!identity.request_id.empty()) {
     SessionInfo created = session->Outline();
     created.state = SessionState::kLoaded;
-    created.revision = created.durable_revision = 0;
+    created.revision = created.durable_revision = identity.create_revision;
     created_.Remember(identity.request_id, identity.fingerprint,
                       std::make_shared<const SessionInfo>(std::move(created)), sizeof(created));
   }

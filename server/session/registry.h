@@ -33,6 +33,18 @@ struct UnloadPolicy {
   uint64_t max_loaded_bytes = std::numeric_limits<uint64_t>::max();  ///< of all that could be unloaded
 };
 
+/// A session that is to be made of a mesh.
+struct SessionSeed {
+  std::string name;
+  SessionSettings settings = {};         ///< but `duplicates`, which is the mesh's
+  Mesh mesh;                             ///< of any revision, whatever relations it stores; no batch is open
+  absl::Time commit_time = absl::Now();  ///< of mesh.revision()
+  absl::Time create_time = absl::Now();
+  // For retries: the fingerprint is of all that tells the request from others, the name too.
+  std::string request_id = {};
+  uint64_t fingerprint = 0;
+};
+
 /// The sessions of a daemon by name.
 ///
 /// A session that a store has is loaded when it is found, and unloaded again when UnloadIdle() is called and
@@ -68,6 +80,17 @@ class SessionRegistry {
   absl::StatusOr<SessionInfo> Create(const std::string& name, const SessionSettings& settings,
                                      const std::string& request_id);
 
+  /// Makes a session that begins with a mesh, at the revision which that has: its stamps stay, so ids are as
+  /// old as they were, and differences can be asked for from earlier revisions. It has no batches to undo.
+  /// All or nothing: nobody finds it before it is whole, and on disk if it is durable. A retry gets what the
+  /// first call gave; `seed` is used up then, as it is by an error.
+  /// Errors: those of Create; RESOURCE_EXHAUSTED LIMIT_EXCEEDED (max_vertices to max_cells,
+  /// max_session_bytes) when the mesh is more than a session may hold here. Cost: storing all pages.
+  absl::StatusOr<SessionInfo> CreateFrom(SessionSeed seed);
+
+  /// OK, or why no session of that name can be made now: errors of Create but for those of the store.
+  absl::Status CheckCreation(const std::string& name) const ABSL_LOCKS_EXCLUDED(mu_);
+
   /// Calls Session::EnsureLoaded(). Errors: NOT_FOUND SESSION_NOT_FOUND.
   absl::StatusOr<SessionPtr> Find(absl::string_view name);
 
@@ -102,7 +125,6 @@ class SessionRegistry {
   const Workers& workers() const { return workers_; }
 
  private:
-  struct Creation;
   struct Entry {
     SessionPtr session;
     absl::Time last_used = absl::Now();
@@ -113,11 +135,13 @@ class SessionRegistry {
     absl::Duration idle;
   };
 
-  absl::StatusOr<SessionInfo> CreateOnce(const Creation& creation) ABSL_EXCLUSIVE_LOCKS_REQUIRED(create_mu_);
-  absl::Status CheckCreation(const std::string& name) const ABSL_LOCKS_EXCLUDED(mu_);
-  absl::StatusOr<SessionPtr> MakeSession(const Creation& creation);
-  absl::StatusOr<std::unique_ptr<SessionLog>> MakeLog(const std::string& name,
+  absl::Status Prepare(SessionSeed& seed) const;
+  absl::StatusOr<SessionInfo> CreateOnce(SessionSeed& seed) ABSL_EXCLUSIVE_LOCKS_REQUIRED(create_mu_);
+  absl::StatusOr<SessionPtr> MakeSession(SessionSeed& seed);
+  absl::StatusOr<std::unique_ptr<SessionLog>> MakeLog(const SessionSeed& seed,
                                                       const SessionIdentity& identity);
+  absl::StatusOr<std::unique_ptr<SessionLog>> StoreSeed(const SessionSeed& seed,
+                                                        const SessionIdentity& identity);
   absl::StatusOr<SessionPtr> OpenStored(const std::string& name) ABSL_EXCLUSIVE_LOCKS_REQUIRED(create_mu_);
   std::unique_ptr<SessionLog> LogFor(std::unique_ptr<SessionStore> store, SessionDurability durability) const;
 

@@ -151,6 +151,13 @@ Session::Session(const Options& options, std::shared_ptr<SessionLog> log, Conten
 
 Session::~Session() = default;
 
+void Session::BeginWith(Mesh mesh, absl::Time commit_time) {
+  WriterMutexLock lock(&mu_);
+  mesh_ = std::move(mesh);
+  Committed();
+  commit_time_ = commit_time;
+}
+
 std::string Session::NewUid() {
   std::random_device device;
   return absl::StrCat(absl::Hex(uint64_t{device()} << 32 | device(), absl::kZeroPad16));

@@ -113,6 +113,7 @@ class Session : public std::enable_shared_from_this<Session> {
     // Of the request that created it, which its log's store remembers.
     std::string create_request_id = {};
     uint64_t create_fingerprint = 0;
+    int64_t create_revision = 0;             ///< at which it began
     // Of one that was loaded before.
     absl::optional<absl::Time> update_time = absl::nullopt;
     uint64_t num_updates = 0;                ///< of settings, which etags tell of
@@ -128,6 +129,10 @@ class Session : public std::enable_shared_from_this<Session> {
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
   ~Session();
+
+  /// Makes `mesh`, of any revision, what this begins with; a log has stored it already. REQUIRES: nobody else
+  /// has this yet; the mesh stores the relations of the settings.
+  void BeginWith(Mesh mesh, absl::Time commit_time) ABSL_LOCKS_EXCLUDED(mu_);
 
   /// 16 hexadecimal digits.
   static std::string NewUid();

@@ -185,8 +185,12 @@ absl::Status Session::StoreImport(const Mesh& mesh) {
 
 absl::Status Session::StoreIdentity() {
   MutexLock lock(&identity_mu_);
-  SessionIdentity identity{uid_, create_time_, options_.settings, options_.create_request_id,
-                           options_.create_fingerprint};
+  SessionIdentity identity{uid_,
+                           create_time_,
+                           options_.settings,
+                           options_.create_request_id,
+                           options_.create_fingerprint,
+                           options_.create_revision};
   identity.settings.checks = checks();
   DYNMESH_RETURN_IF_ERROR(Read([&](const SessionView& view) {
     identity.settings.stored_relations = StoredRelationsOf(view.mesh);

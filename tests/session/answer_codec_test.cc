@@ -144,6 +144,19 @@ TEST(ManifestTest, AnIdentityIsTheSameAgainAndADamagedOneDoesNoHarm) {
   ExpectHarmlessWhenDamaged(bytes, [](absl::string_view b) { return DecodeIdentity(b).ok(); });
 }
 
+TEST(ManifestTest, AnIdentityIsOfTheOldestFormatThatSaysIt) {
+  SessionIdentity identity{"0123456789abcdef", absl::FromUnixMicros(5), {}};
+  identity.settings.durability = SessionDurability::kSync;
+  EXPECT_EQ(EncodeIdentity(identity)[0], 1);
+  identity.create_revision = 300;
+  const std::string bytes = EncodeIdentity(identity);
+  EXPECT_EQ(bytes[0], 2);
+  const auto decoded = DecodeIdentity(bytes);
+  ASSERT_TRUE(decoded.ok()) << decoded.status();
+  EXPECT_EQ(decoded->create_revision, 300);
+  ExpectHarmlessWhenDamaged(bytes, [](absl::string_view b) { return DecodeIdentity(b).ok(); });
+}
+
 TEST(ManifestTest, AManifestIsTheSameAgain) {
   const auto decoded = DecodeManifest(EncodeManifest({absl::FromUnixMicros(9), "head"}));
   ASSERT_TRUE(decoded.ok()) << decoded.status();

@@ -12,11 +12,15 @@ namespace dynmesh {
 namespace {
 
 constexpr uint64_t kManifestFormat = 1;
+// An identity is of the format that it needs: so daemons of before know those that are as ever.
+constexpr uint64_t kPlainIdentityFormat = 1;
+constexpr uint64_t kIdentityFormat = 2;
 
-absl::Status CheckManifestFormat(ByteReader& in, absl::string_view what) {
+absl::StatusOr<uint64_t> ReadFormat(ByteReader& in, uint64_t newest, absl::string_view what) {
   const uint64_t format = in.Varint();
   if (!in.ok() || format == 0) return StoreDamaged(what);
-  return format <= kManifestFormat ? absl::OkStatus() : StoreFormatNewer(format, kManifestFormat);
+  if (format > newest) return StoreFormatNewer(format, newest);
+  return format;
 }
 
 void WriteChecks(const CheckSettings& checks, ByteWriter& out) {
@@ -78,7 +82,7 @@ std::string EncodeManifest(const SessionManifest& manifest) {
 absl::StatusOr<SessionManifest> DecodeManifest(absl::string_view bytes) {
   constexpr absl::string_view kWhat = "the manifest of a checkpoint is none";
   ByteReader in(bytes);
-  DYNMESH_RETURN_IF_ERROR(CheckManifestFormat(in, kWhat));
+  DYNMESH_RETURN_IF_ERROR(ReadFormat(in, kManifestFormat, kWhat).status());
   SessionManifest manifest;
   manifest.commit_time = absl::FromUnixMicros(in.Fixed<int64_t>());
   manifest.head = std::string(in.Bytes(in.remaining()));
@@ -89,7 +93,7 @@ absl::StatusOr<SessionManifest> DecodeManifest(absl::string_view bytes) {
 std::string EncodeIdentity(const SessionIdentity& identity) {
   const SessionSettings& settings = identity.settings;
   ByteWriter out;
-  out.Varint(kManifestFormat);
+  out.Varint(identity.create_revision == 0 ? kPlainIdentityFormat : kIdentityFormat);
   out.Text(identity.uid);
   out.Fixed(absl::ToUnixMicros(identity.create_time));
   out.Text(identity.request_id);
@@ -100,19 +104,26 @@ std::string EncodeIdentity(const SessionIdentity& identity) {
   for (Relation relation : settings.stored_relations)
     out.Fixed(static_cast<uint8_t>(StorableIndex(relation)));
   WriteChecks(settings.checks, out);
+  if (identity.create_revision != 0) out.Varint(static_cast<uint64_t>(identity.create_revision));
   return std::move(out).Take();
 }
 
 absl::StatusOr<SessionIdentity> DecodeIdentity(absl::string_view bytes) {
   constexpr absl::string_view kWhat = "the identity of a session is none";
   ByteReader in(bytes);
-  DYNMESH_RETURN_IF_ERROR(CheckManifestFormat(in, kWhat));
+  DYNMESH_ASSIGN_OR_RETURN(const uint64_t format, ReadFormat(in, kIdentityFormat, kWhat));
   SessionIdentity identity;
   identity.uid = in.Text();
   identity.create_time = absl::FromUnixMicros(in.Fixed<int64_t>());
   identity.request_id = in.Text();
   identity.fingerprint = in.Fixed<uint64_t>();
-  if (!ReadSettings(in, identity.settings) || !in.done()) return StoreDamaged(kWhat);
+  bool sound = ReadSettings(in, identity.settings);
+  if (format > kPlainIdentityFormat) {
+    const uint64_t revision = in.Varint();
+    sound &= revision > 0 && revision <= kMaxStamp;
+    identity.create_revision = static_cast<int64_t>(revision);
+  }
+  if (!sound || !in.done()) return StoreDamaged(kWhat);
   return identity;
 }
 

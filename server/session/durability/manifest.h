@@ -30,13 +30,15 @@ struct SessionIdentity {
   // Of the request that created it, for retries.
   std::string request_id = {};
   uint64_t fingerprint = 0;
+  int64_t create_revision = 0;  ///< at which it began
 };
 
 inline constexpr char kIdentityName[] = "identity";
 
-/// Format (varint, 1), uid, creation (int64, us since 1970), request id, fingerprint (u64), durability (u8),
-/// duplicates (u8), stored relations (their places in kStorableRelations) and checks that are not as usual
-/// (name, severity, threshold); texts and lists begin with their length (varint).
+/// Format (varint, 1; 2 where it began at a later revision than 0), uid, creation (int64, us since 1970),
+/// request id, fingerprint (u64), durability (u8), duplicates (u8), stored relations (their places in
+/// kStorableRelations) and checks that are not as usual (name, severity, threshold), in format 2 the revision
+/// at which it began (varint); texts and lists begin with their length (varint).
 std::string EncodeIdentity(const SessionIdentity& identity);
 /// Errors: as DecodeManifest.
 absl::StatusOr<SessionIdentity> DecodeIdentity(absl::string_view bytes);
