@@ -61,11 +61,11 @@ class BatchRestorer {
   absl::Status Check() const {
     if (!(image_.fit == mesh_.FitNow())) return DoesNotFit();
     bool fits = AreLive(EntityKind::kVertex, image_.moved.slots) &&
-                AreVacant(EntityKind::kVertex, image_.ended_vertices.slots);
+                CanBePutBack(EntityKind::kVertex, image_.ended_vertices.slots);
     for (EntityKind kind : kEntityKinds) {
       const int k = Dimension(kind);
       fits = fits && AreLive(kind, image_.made[k]) && AreLive(kind, image_.reshaped[k].slots) &&
-             AreVacant(kind, image_.ended[k].slots);
+             CanBePutBack(kind, image_.ended[k].slots);
     }
     for (const BatchImage::Rows& rows : image_.rows) {
       fits = fits && rows.column < static_cast<int>(mesh_.attributes().size());
@@ -97,9 +97,12 @@ class BatchRestorer {
     return std::all_of(slots.begin(), slots.end(), [&](Slot slot) { return mesh_.IsLive({kind, slot}); });
   }
 
-  bool AreVacant(EntityKind kind, absl::Span<const Slot> slots) const {
+  /// Nobody is there, or somebody who goes.
+  bool CanBePutBack(EntityKind kind, absl::Span<const Slot> slots) const {
+    const std::vector<Slot>& made = image_.made[Dimension(kind)];
     return std::all_of(slots.begin(), slots.end(), [&](Slot slot) {
-      return slot < mesh_.slots(kind).limit() && !mesh_.IsLive({kind, slot});
+      return mesh_.IsLive({kind, slot}) ? std::binary_search(made.begin(), made.end(), slot)
+                                        : slot < mesh_.slots(kind).limit();
     });
   }
 
