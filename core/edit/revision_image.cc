@@ -15,7 +15,7 @@ namespace {
 
 bool HasSameBits(const Point& a, const Point& b) { return std::memcmp(&a, &b, sizeof(a)) == 0; }
 
-absl::Status RevisionInFuture(const Mesh& mesh, const Mesh& target) {
+absl::Status NotReachedYet(const Mesh& mesh, const Mesh& target) {
   return MakeError(
       absl::StatusCode::kOutOfRange, reason::kRevisionInFuture,
       absl::StrCat("revision ", target.revision(), " is not reached yet: the mesh is at ", mesh.revision()),
@@ -88,7 +88,7 @@ class RevisionComparer {
 
   /// Arrays of a mesh never get shorter or narrower.
   absl::Status CheckShape() const {
-    if (target_.revision() > mesh_.revision()) return RevisionInFuture(mesh_, target_);
+    if (target_.revision() > mesh_.revision()) return NotReachedYet(mesh_, target_);
     bool fits = target_.FaceStride() <= mesh_.FaceStride() &&
                 target_.CellVertexStride() <= mesh_.CellVertexStride() &&
                 target_.CellFaceStride() <= mesh_.CellFaceStride();
