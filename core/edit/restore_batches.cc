@@ -22,18 +22,10 @@ void Keep(BatchImage image, size_t max_bytes, std::deque<BatchImage>& images) {
 
 }  // namespace
 
-absl::StatusOr<RestoredBatches> RestoreBatches(Mesh& mesh, absl::Span<const BatchImage* const> images,
-                                               const RestoreOptions& options) {
+absl::StatusOr<RestoredBatches> RunRestore(Mesh& mesh, const RestoreOptions& options,
+                                           absl::FunctionRef<absl::Status(std::deque<BatchImage>&)> restore) {
   RestoredBatches result;
-  const absl::Status restored = RunInBatch(mesh, [&]() -> absl::Status {
-    for (const BatchImage* image : images) {
-      DYNMESH_RETURN_IF_ERROR(Charge(*image, options.meter));
-      DYNMESH_ASSIGN_OR_RETURN(BatchImage inverse, mesh.Restore(*image));
-      Keep(std::move(inverse), options.max_image_bytes, result.images);
-    }
-    return absl::OkStatus();
-  });
-  if (!restored.ok()) return restored;
+  DYNMESH_RETURN_IF_ERROR(RunInBatch(mesh, [&] { return restore(result.images); }));
   const BatchImage::Fit now = mesh.FitNow();
   result.checksum = now.checksum;
   result.counts = now.num_live;
@@ -42,6 +34,18 @@ absl::StatusOr<RestoredBatches> RestoreBatches(Mesh& mesh, absl::Span<const Batc
   DYNMESH_RETURN_IF_ERROR(EndBatch(mesh, ending, options.keeper));
   result.revision = mesh.revision();
   return result;
+}
+
+absl::StatusOr<RestoredBatches> RestoreBatches(Mesh& mesh, absl::Span<const BatchImage* const> images,
+                                               const RestoreOptions& options) {
+  return RunRestore(mesh, options, [&](std::deque<BatchImage>& inverses) -> absl::Status {
+    for (const BatchImage* image : images) {
+      DYNMESH_RETURN_IF_ERROR(Charge(*image, options.meter));
+      DYNMESH_ASSIGN_OR_RETURN(BatchImage inverse, mesh.Restore(*image));
+      Keep(std::move(inverse), options.max_image_bytes, inverses);
+    }
+    return absl::OkStatus();
+  });
 }
 
 }  // namespace dynmesh

@@ -7,6 +7,7 @@
 #include <deque>
 #include <limits>
 
+#include "absl/functional/function_ref.h"
 #include "absl/status/statusor.h"
 #include "absl/types/span.h"
 #include "core/edit/batch_keeper.h"
@@ -27,7 +28,7 @@ struct RestoreOptions {
   BatchKeeper* keeper = nullptr;
 };
 
-/// What undoing or redoing batches did or, for a dry run, would have done.
+/// What undoing or redoing batches, or going back to a revision, did or, for a dry run, would have done.
 struct RestoredBatches {
   int64_t revision = 0;  ///< after it; of the dry run: before
   Checksum checksum;
@@ -44,6 +45,12 @@ struct RestoredBatches {
 /// it was, to the last id and stamp. REQUIRES: no batch is open on `mesh`. Cost: that of Mesh::Restore.
 absl::StatusOr<RestoredBatches> RestoreBatches(Mesh& mesh, absl::Span<const BatchImage* const> images,
                                                const RestoreOptions& options);
+
+/// What restoring is made of: runs restore(images), which edits `mesh` and gives what takes that back, as a
+/// batch that is kept and committed or, for a dry run, rolled back. Errors: those of RunInBatch, EndBatch.
+absl::StatusOr<RestoredBatches> RunRestore(
+    Mesh& mesh, const RestoreOptions& options,
+    absl::FunctionRef<absl::Status(std::deque<BatchImage>& images)> restore);
 
 }  // namespace dynmesh
 

@@ -23,8 +23,9 @@ namespace dynmesh {
 ///     mesh.Commit();
 ///
 /// An image fits the mesh that the batch left, and no other: batches are undone last first. It holds the net
-/// effect: what a batch both made and removed is not in it. All slot lists ascend strictly. Columns that a
-/// batch added stay; their rows go back to what they were at first.
+/// effect: what a batch both made and removed is not in it. All slot lists ascend strictly. A slot at which one
+/// entity ended and another was made is in both lists; its rows are those of the one that ended. Columns that
+/// a batch added stay; their rows go back to what they were at first.
 struct BatchImage {
   /// What an edge, face or cell is made of. In `states`: bits.
   static constexpr uint8_t kElement = 1;

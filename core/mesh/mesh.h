@@ -265,9 +265,7 @@ class Mesh {
   /// The steps of the open batch so far.
   const Journal& journal() const { return journal_; }
   /// What takes the mesh back to where it was at `savepoint` (0: at BeginBatch()) when it is as it is now.
-  /// REQUIRES: a batch is open, and between the two no slot has been given to another entity: Restore() does
-  /// that, but only to slots freed before it was called. Cost: O(n log n) steps since, less where they
-  /// ascend.
+  /// REQUIRES: a batch is open. Cost: O(n log n) steps since, less where they ascend.
   BatchImage ImageSince(Savepoint savepoint) const;
   /// Puts back what a batch changed, as edits of the open batch; returns what takes that back in turn. Many
   /// may follow each other in one batch.
@@ -288,6 +286,7 @@ class Mesh {
   size_t memory_bytes() const;
 
  private:
+  friend class BatchImageBuilder;
   friend class BatchRestorer;
   friend class BulkBuilder;
   friend class MeshValidator;

@@ -1,94 +1,30 @@
 // What a batch changed, read off its journal: the net effect, as it was before.
 //
-// No slot has two occupants between a savepoint and the end of a batch, so arrays still hold what ended
-// there, but for what later steps changed of it: those are taken back on a copy.
+// Arrays still hold what ended at a slot, or the journal does where another entity was put there; later steps
+// that changed it are taken back on a copy.
 
 #include <algorithm>
+#include <limits>
 
 #include "core/mesh/batch_image.h"
+#include "core/mesh/entity_content.h"
 #include "core/mesh/mesh.h"
 
 namespace dynmesh {
 namespace {
 
-/// One edge, face or cell, as BatchImage::Entities tells it.
-struct Content {
-  ElementType type;
-  uint8_t state;
-  std::array<VertexId, kMaxElementVertices> vertices;
-  std::array<Slot, kMaxElementFaces> parts;
-  int num_parts;
-
-  /// All but the parts, which follow from the vertices.
-  bool IsShapedAs(const Content& other) const {
-    return state == other.state &&
-           std::equal(vertices.begin(), vertices.begin() + NumVertices(type), other.vertices.begin());
-  }
-};
-
-Content ContentOf(const Mesh& mesh, EntityId id) {
-  Content content = {mesh.Type(id), 0, {}, {}, 0};
-  if (mesh.IsElement(id)) content.state |= BatchImage::kElement;
-  if (mesh.IsDuplicate(id)) content.state |= BatchImage::kDuplicate;
-  const auto vertices = mesh.VerticesOf(id);
-  std::copy(vertices.begin(), vertices.end(), content.vertices.begin());
-  if (id.kind == EntityKind::kFace) {
-    for (EdgeId e : mesh.Edges(FaceId(id.slot))) content.parts[content.num_parts++] = e.slot();
-  } else if (id.kind == EntityKind::kCell) {
-    for (OrientedFace oriented : mesh.Faces(CellId(id.slot))) {
-      content.parts[content.num_parts++] = oriented.face().slot();
-    }
-  }
-  return content;
-}
-
-void Append(Slot slot, const Content& content, BatchImage::Entities& entities) {
-  entities.slots.push_back(slot);
-  entities.types.push_back(content.type);
-  entities.states.push_back(content.state);
-  entities.vertices.insert(entities.vertices.end(), content.vertices.begin(),
-                           content.vertices.begin() + NumVertices(content.type));
-  entities.parts.insert(entities.parts.end(), content.parts.begin(),
-                        content.parts.begin() + content.num_parts);
-}
-
-/// Room for what most entities need: of tetrahedra exactly.
-void Expect(size_t count, BatchImage::Entities& entities) {
-  constexpr size_t kTypicalVertices = 4;
-  entities.slots.reserve(count);
-  entities.types.reserve(count);
-  entities.states.reserve(count);
-  entities.vertices.reserve(count * kTypicalVertices);
-  entities.parts.reserve(count * kTypicalVertices);
-}
-
-/// Images may be kept for long.
-void Trim(BatchImage::Entities& entities) {
-  entities.slots.shrink_to_fit();
-  entities.types.shrink_to_fit();
-  entities.states.shrink_to_fit();
-  entities.vertices.shrink_to_fit();
-  entities.parts.shrink_to_fit();
-}
-
-/// A step that changed flags or order of an edge or face.
-struct Change {
-  Slot slot;
-  JournalOp op;
-  uint8_t code;  ///< of kReorderFace
-};
-
-void Reorder(FaceCode code, Content& face) {
+void Reorder(FaceCode code, EntityContent& face) {
   const int n = NumVertices(face.type);
-  const Content before = face;
+  const EntityContent before = face;
   for (int k = 0; k < n; ++k) {
     face.vertices[k] = before.vertices[code.StoredVertex(k, n)];
     face.parts[k] = before.parts[code.StoredEdge(k, n)];
   }
 }
 
-void TakeBack(const Change& change, Content& content) {
-  switch (change.op) {
+/// Of a step that changed flags or order of an edge or face. `code` is that of kReorderFace.
+void TakeBack(JournalOp op, uint8_t code, EntityContent& content) {
+  switch (op) {
     case JournalOp::kSetElement:
     case JournalOp::kClearElement:
       content.state ^= BatchImage::kElement;
@@ -100,7 +36,7 @@ void TakeBack(const Change& change, Content& content) {
     case JournalOp::kFlipEdge:
       return std::swap(content.vertices[0], content.vertices[1]);
     default:
-      return Reorder(FaceCode{change.code}, content);
+      return Reorder(FaceCode{code}, content);
   }
 }
 
@@ -118,9 +54,15 @@ void SortSlots(std::vector<Slot>& slots) {
   if (!std::is_sorted(slots.begin(), slots.end())) std::sort(slots.begin(), slots.end());
 }
 
-class ImageBuilder {
+}  // namespace
+
+/// One Mesh::ImageSince().
+///
+/// Of an entity only the steps before it ended count, and of one that was made none. What tells whose step it
+/// is where a slot had several occupants, is whether somebody was made there before it.
+class BatchImageBuilder {
  public:
-  ImageBuilder(const Mesh& mesh, Mesh::Savepoint since) : mesh_(mesh), since_(since) {}
+  BatchImageBuilder(const Mesh& mesh, Mesh::Savepoint since) : mesh_(mesh), since_(since) {}
 
   BatchImage Build() && {
     ListMade();
@@ -130,37 +72,47 @@ class ImageBuilder {
     for (EntityKind kind : kEntityKinds) {
       if (kind != EntityKind::kVertex) KeepEnded(kind);
       if (kind != EntityKind::kVertex) KeepReshaped(kind);
-      std::vector<Slot>& made = image_.made[Dimension(kind)];
-      const auto is_gone = [&](Slot slot) { return !mesh_.IsLive({kind, slot}); };
-      made.erase(std::remove_if(made.begin(), made.end(), is_gone), made.end());
-      made.shrink_to_fit();
+      KeepMade(kind);
     }
     image_.fit = mesh_.FitNow();
     return std::move(image_);
   }
 
  private:
-  /// A value before: the n-th on its stack, or from a byte on.
-  struct Before {
+  static constexpr size_t kNever = std::numeric_limits<size_t>::max();
+
+  /// Something of a slot: the n-th on a stack or in the journal, or from a byte on.
+  struct At {
     Slot slot;
     size_t at;
+  };
+
+  /// A step that changed flags or order of an edge or face.
+  struct Change {
+    Slot slot;
+    JournalOp op;
+    uint8_t code;  ///< of kReorderFace
   };
 
   void ListMade() {
     const auto& entries = mesh_.journal().entries;
     for (size_t i = since_; i < entries.size(); ++i) {
-      if (entries[i].op == JournalOp::kCreate) {
-        image_.made[Dimension(entries[i].kind)].push_back(entries[i].slot);
-      }
+      if (entries[i].op != JournalOp::kCreate) continue;
+      made_[Dimension(entries[i].kind)].push_back({entries[i].slot, i});
     }
-    for (std::vector<Slot>& slots : image_.made) SortSlots(slots);
+    for (std::vector<At>& made : made_) KeepFirstOfEach(made);
   }
 
-  /// Whether it began since the savepoint.
-  bool IsMade(EntityId id) const {
-    if (mesh_.slots(id.kind).Born(id.slot) <= mesh_.revision()) return false;
-    const std::vector<Slot>& made = image_.made[Dimension(id.kind)];
-    return std::binary_search(made.begin(), made.end(), id.slot);
+  /// The entry at which somebody was first made at a slot since the savepoint, or kNever.
+  size_t FirstMade(EntityId id) const {
+    if (mesh_.slots(id.kind).Born(id.slot) <= mesh_.revision()) return kNever;
+    return Find(id.slot, made_[Dimension(id.kind)]);
+  }
+
+  static size_t Find(Slot slot, const std::vector<At>& items) {
+    const auto it = std::lower_bound(items.begin(), items.end(), slot,
+                                     [](const At& item, Slot wanted) { return item.slot < wanted; });
+    return it != items.end() && it->slot == slot ? it->at : kNever;
   }
 
   /// Last entry first: so stacks can be walked down, and what happened to one entity comes in the order in
@@ -170,34 +122,50 @@ class ImageBuilder {
     positions_end_ = journal.positions.size();
     rows_end_ = journal.rows.size();
     rows_.resize(mesh_.attributes().size());
-    for (size_t i = journal.entries.size(); i > since_; --i) Read(journal.entries[i - 1]);
+    contents_end_ = journal.contents.size();
+    for (size_t i = journal.entries.size(); i > since_; --i) Read(journal.entries[i - 1], i - 1);
+    for (std::vector<At>& replaced : replaced_) KeepFirstOfEach(replaced);
   }
 
-  void Read(const JournalEntry& entry) {
+  void Read(const JournalEntry& entry, size_t index) {
+    if (entry.op == JournalOp::kCreate || entry.op == JournalOp::kAddAttribute) return;
     const EntityId id(entry.kind, entry.slot);
+    const size_t first_made = FirstMade(id);
+    const bool of_made = index > first_made;
     switch (entry.op) {
-      case JournalOp::kCreate:
-      case JournalOp::kAddAttribute:
-        return;
       case JournalOp::kRecycle:
-        if (id.kind == EntityKind::kVertex) --positions_end_;
-        return;
+        return ReadReplaced(id, of_made);
       case JournalOp::kDestroy:
-        if (!IsMade(id)) ended_[Dimension(id.kind)].push_back(id.slot);
+        if (!of_made) ended_[Dimension(id.kind)].push_back(id.slot);
         return;
       case JournalOp::kMoveVertex:
         --positions_end_;
-        if (!IsMade(id)) moves_.push_back({id.slot, positions_end_});
+        if (!of_made) moves_.push_back({id.slot, positions_end_});
         return;
       case JournalOp::kSetAttribute:
         rows_end_ -= mesh_.attributes()[entry.a].spec().row_bytes();
-        if (!IsMade(id)) rows_[entry.a].push_back({id.slot, rows_end_});
+        if (!of_made) rows_[entry.a].push_back({id.slot, rows_end_});
         return;
       default:
-        if (IsMade(id)) return;
-        auto& changes = mesh_.IsLive(id) ? live_changes_ : ended_changes_;
+        if (of_made) return;
+        auto& changes = first_made == kNever && mesh_.IsLive(id) ? live_changes_ : ended_changes_;
         changes[Dimension(id.kind)].push_back({id.slot, entry.op, static_cast<uint8_t>(entry.a)});
     }
+  }
+
+  /// Somebody is about to be put where another ended. Where a vertex stood, is as good as a move from there.
+  void ReadReplaced(EntityId id, bool of_made) {
+    const bool is_vertex = id.kind == EntityKind::kVertex;
+    const size_t at = is_vertex ? --positions_end_ : --contents_end_;
+    if (!of_made) (is_vertex ? moves_ : replaced_[Dimension(id.kind)]).push_back({id.slot, at});
+  }
+
+  void KeepMade(EntityKind kind) {
+    std::vector<Slot>& kept = image_.made[Dimension(kind)];
+    for (const At& made : made_[Dimension(kind)]) {
+      if (mesh_.IsLive({kind, made.slot})) kept.push_back(made.slot);
+    }
+    kept.shrink_to_fit();
   }
 
   void KeepMoves() {
@@ -218,7 +186,8 @@ class ImageBuilder {
     for (; move != moves_.end(); ++move) KeepMove(*move);
   }
 
-  void KeepMove(const Before& move) {
+  void KeepMove(const At& move) {
+    if (FirstMade(VertexId(move.slot)) != kNever) return;  // nobody was there at the savepoint
     image_.moved.slots.push_back(move.slot);
     image_.moved.positions.push_back(mesh_.journal().positions[move.at]);
   }
@@ -253,11 +222,33 @@ class ImageBuilder {
     if (!ended.empty()) Expect(ended.size(), kept);
     auto change = changes.begin();
     for (Slot slot : ended) {
-      Content content = ContentOf(mesh_, {kind, slot});
-      for (; change != changes.end() && change->slot == slot; ++change) TakeBack(*change, content);
+      EntityContent content = LastContent({kind, slot});
+      for (; change != changes.end() && change->slot == slot; ++change)
+        TakeBack(change->op, change->code, content);
       Append(slot, content, kept);
     }
     Trim(kept);
+  }
+
+  /// Of who was there at the savepoint, when it ended.
+  EntityContent LastContent(EntityId id) const {
+    const size_t at = Find(id.slot, replaced_[Dimension(id.kind)]);
+    return at == kNever ? ContentOf(mesh_, id) : Unpack(mesh_.journal().contents[at], id.kind);
+  }
+
+  static EntityContent Unpack(const SlotContent& saved, EntityKind kind) {
+    EntityContent content;
+    content.type = static_cast<ElementType>(saved.flags & Mesh::kTypeMask);
+    if (saved.flags & Mesh::kElementFlag) content.state |= BatchImage::kElement;
+    if (saved.flags & Mesh::kDuplicateFlag) content.state |= BatchImage::kDuplicate;
+    content.vertices = saved.vertices;
+    if (kind == EntityKind::kFace) content.num_parts = NumVertices(content.type);
+    if (kind == EntityKind::kCell) content.num_parts = TemplateOf(content.type).num_faces;
+    for (int k = 0; k < content.num_parts; ++k) {
+      const uint32_t part = saved.parts[k];
+      content.parts[k] = kind == EntityKind::kCell ? OrientedFace::FromPacked(part).face().slot() : part;
+    }
+    return content;
   }
 
   void KeepReshaped(EntityKind kind) {
@@ -265,9 +256,10 @@ class ImageBuilder {
     SortChanges(changes);
     for (auto change = changes.begin(); change != changes.end();) {
       const Slot slot = change->slot;
-      const Content now = ContentOf(mesh_, {kind, slot});
-      Content before = now;
-      for (; change != changes.end() && change->slot == slot; ++change) TakeBack(*change, before);
+      const EntityContent now = ContentOf(mesh_, {kind, slot});
+      EntityContent before = now;
+      for (; change != changes.end() && change->slot == slot; ++change)
+        TakeBack(change->op, change->code, before);
       before.num_parts = 0;
       if (!before.IsShapedAs(now)) Append(slot, before, image_.reshaped[Dimension(kind)]);
     }
@@ -278,16 +270,17 @@ class ImageBuilder {
   BatchImage image_;
   size_t positions_end_ = 0;
   size_t rows_end_ = 0;
+  size_t contents_end_ = 0;
+  std::array<std::vector<At>, kNumEntityKinds> made_;      ///< slots with entries
+  std::array<std::vector<At>, kNumEntityKinds> replaced_;  ///< slots with contents, of who ended there
   std::array<std::vector<Slot>, kNumEntityKinds> ended_;
   std::array<std::vector<Change>, kNumEntityKinds> ended_changes_;
   std::array<std::vector<Change>, kNumEntityKinds> live_changes_;
-  std::vector<Before> moves_;
-  std::vector<std::vector<Before>> rows_;  ///< by column
+  std::vector<At> moves_;
+  std::vector<std::vector<At>> rows_;  ///< by column
 };
 
-}  // namespace
-
-BatchImage Mesh::ImageSince(Savepoint savepoint) const { return ImageBuilder(*this, savepoint).Build(); }
+BatchImage Mesh::ImageSince(Savepoint savepoint) const { return BatchImageBuilder(*this, savepoint).Build(); }
 
 BatchImage::Fit Mesh::FitNow() const {
   BatchImage::Fit fit = {checksum_, {}};

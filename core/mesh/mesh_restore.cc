@@ -61,11 +61,11 @@ class BatchRestorer {
   absl::Status Check() const {
     if (!(image_.fit == mesh_.FitNow())) return DoesNotFit();
     bool fits = AreLive(EntityKind::kVertex, image_.moved.slots) &&
-                AreVacant(EntityKind::kVertex, image_.ended_vertices.slots);
+                CanBePutBack(EntityKind::kVertex, image_.ended_vertices.slots);
     for (EntityKind kind : kEntityKinds) {
       const int k = Dimension(kind);
       fits = fits && AreLive(kind, image_.made[k]) && AreLive(kind, image_.reshaped[k].slots) &&
-             AreVacant(kind, image_.ended[k].slots);
+             CanBePutBack(kind, image_.ended[k].slots);
     }
     for (const BatchImage::Rows& rows : image_.rows) {
       fits = fits && rows.column < static_cast<int>(mesh_.attributes().size());
@@ -84,8 +84,8 @@ class BatchRestorer {
     }
     PutBackVertices();
     for (EntityKind kind : {EntityKind::kEdge, EntityKind::kFace, EntityKind::kCell}) {
-      DYNMESH_RETURN_IF_ERROR(ForEachEntity(kind, image_.ended[Dimension(kind)],
-                                            [this](const EntityView& view) { return PutBack(view); }));
+      DYNMESH_RETURN_IF_ERROR(PutBackThose(kind, 0));
+      DYNMESH_RETURN_IF_ERROR(PutBackThose(kind, BatchImage::kDuplicate));
     }
     mesh_.SettleBoundaries(image_.ended[3].slots);
     for (const BatchImage::Rows& rows : image_.rows) PutBackRows(rows);
@@ -97,9 +97,12 @@ class BatchRestorer {
     return std::all_of(slots.begin(), slots.end(), [&](Slot slot) { return mesh_.IsLive({kind, slot}); });
   }
 
-  bool AreVacant(EntityKind kind, absl::Span<const Slot> slots) const {
+  /// Nobody is there, or somebody who goes.
+  bool CanBePutBack(EntityKind kind, absl::Span<const Slot> slots) const {
+    const std::vector<Slot>& made = image_.made[Dimension(kind)];
     return std::all_of(slots.begin(), slots.end(), [&](Slot slot) {
-      return slot < mesh_.slots(kind).limit() && !mesh_.IsLive({kind, slot});
+      return mesh_.IsLive({kind, slot}) ? std::binary_search(made.begin(), made.end(), slot)
+                                        : slot < mesh_.slots(kind).limit();
     });
   }
 
@@ -171,6 +174,13 @@ class BatchRestorer {
     for (size_t i = 0; i < image_.moved.slots.size(); ++i) {
       mesh_.MoveTo(VertexId(image_.moved.slots[i]), image_.moved.positions[i]);
     }
+  }
+
+  /// Those of this state. Duplicates come last, so that a roll-back ends them first, as DuplicatesFirst().
+  absl::Status PutBackThose(EntityKind kind, uint8_t duplicate) {
+    return ForEachEntity(kind, image_.ended[Dimension(kind)], [&](const EntityView& view) {
+      return (view.state & BatchImage::kDuplicate) == duplicate ? PutBack(view) : absl::OkStatus();
+    });
   }
 
   absl::Status PutBack(const EntityView& view) {
