@@ -6,10 +6,13 @@ namespace dynmesh {
 
 absl::StatusOr<std::unique_ptr<Adaptation>> Adaptation::Start(SessionPtr session,
                                                               std::shared_ptr<Budget> places,
-                                                              const AdaptOptions& options) {
+                                                              const AdaptOptions& options,
+                                                              RevisionNote note) {
+  DYNMESH_RETURN_IF_ERROR(CheckNote(note));
   Lease place(std::move(places));
   DYNMESH_RETURN_IF_ERROR(place.Grow(1));
-  std::unique_ptr<Adaptation> adaptation(new Adaptation(std::move(session), std::move(place)));
+  std::unique_ptr<Adaptation> adaptation(
+      new Adaptation(std::move(session), std::move(place), std::move(note)));
   DYNMESH_RETURN_IF_ERROR(adaptation->session_->Read([&](const SessionView& view) -> absl::Status {
     DYNMESH_ASSIGN_OR_RETURN(adaptation->adapter_, Adapter::Start(view.mesh, options));
     return absl::OkStatus();
@@ -25,7 +28,9 @@ absl::Status Adaptation::Step() {
     if (bytes > most) return LimitExceeded("max_session_bytes", most, bytes);
     return mesh.MakeSavepoint() == before ? BatchEnding::kRollBack : BatchEnding::kCommit;
   };
-  return session_->EditMesh(edit, [](const Mesh&) { return LoggedRequest{LoggedCall::kAdaptation}; });
+  return session_->EditMesh(edit, [this](const Mesh&) {
+    return LoggedRequest{LoggedCall::kAdaptation, {}, 0, {}, note_};
+  });
 }
 
 absl::StatusOr<AdaptResult> Adaptation::Finish() {

@@ -21,7 +21,8 @@ class Adaptation {
   /// Reads the session. Errors: those of Adapter::Start; RESOURCE_EXHAUSTED LIMIT_EXCEEDED
   /// (max_concurrent_adaptations); NOT_FOUND SESSION_DELETED.
   static absl::StatusOr<std::unique_ptr<Adaptation>> Start(SessionPtr session, std::shared_ptr<Budget> places,
-                                                           const AdaptOptions& options);
+                                                           const AdaptOptions& options,
+                                                           RevisionNote note = {});
 
   Session& session() { return *session_; }
   bool done() const { return adapter_->done(); }
@@ -38,10 +39,12 @@ class Adaptation {
   absl::StatusOr<AdaptResult> Finish();
 
  private:
-  Adaptation(SessionPtr session, Lease place) : session_(std::move(session)), place_(std::move(place)) {}
+  Adaptation(SessionPtr session, Lease place, RevisionNote note)
+      : session_(std::move(session)), place_(std::move(place)), note_(std::move(note)) {}
 
   const SessionPtr session_;
-  Lease place_;  ///< of max_concurrent_adaptations
+  Lease place_;              ///< of max_concurrent_adaptations
+  const RevisionNote note_;  ///< of each revision that it makes
   std::unique_ptr<Adapter> adapter_;
 };
 

@@ -22,6 +22,9 @@ uint64_t FingerprintOf(const std::string& name, const SessionSettings& settings)
     fingerprint.AddNumber(static_cast<uint64_t>(setting.severity));
     fingerprint.AddBytes(&setting.threshold, sizeof(setting.threshold));
   }
+  fingerprint.AddNumber(settings.retention.max_revisions);
+  fingerprint.AddNumber(absl::ToInt64Microseconds(settings.retention.max_age));
+  fingerprint.AddNumber(settings.retention.max_bytes);
   return fingerprint.value();
 }
 
@@ -138,17 +141,21 @@ absl::StatusOr<std::unique_ptr<SessionLog>> SessionRegistry::StoreSeed(const Ses
                                                                        const SessionIdentity& identity) {
   DYNMESH_RETURN_IF_ERROR(store_->CreateSession(seed.name));
   DYNMESH_ASSIGN_OR_RETURN(std::unique_ptr<SessionStore> store, store_->OpenSession(seed.name));
-  std::unique_ptr<SessionLog> log = LogFor(std::move(store), identity.settings.durability);
-  DYNMESH_RETURN_IF_ERROR(log->StoreAll(seed.mesh, seed.commit_time));
+  std::unique_ptr<SessionLog> log = LogFor(std::move(store), identity.settings);
+  DYNMESH_RETURN_IF_ERROR(
+      log->StoreAll(seed.mesh, seed.commit_time, {LoggedCall::kCreation, {}, 0, {}, seed.note}));
   DYNMESH_RETURN_IF_ERROR(log->store().PutValue(kIdentityName, EncodeIdentity(identity)));
   return log;
 }
 
 std::unique_ptr<SessionLog> SessionRegistry::LogFor(std::unique_ptr<SessionStore> store,
-                                                    SessionDurability durability) const {
+                                                    const SessionSettings& settings) const {
   SessionLogOptions options = log_options_;
-  options.durability = durability == SessionDurability::kAsync ? Durability::kAsync : Durability::kSync;
-  return std::make_unique<SessionLog>(std::move(store), options, workers_.quick);
+  options.durability =
+      settings.durability == SessionDurability::kAsync ? Durability::kAsync : Durability::kSync;
+  auto log = std::make_unique<SessionLog>(std::move(store), options, workers_.quick);
+  log->SetRetention(settings.retention);
+  return log;
 }
 
 // ---- What the store has ----
@@ -187,8 +194,8 @@ absl::StatusOr<SessionPtr> SessionRegistry::OpenStored(const std::string& name) 
   options.create_request_id = identity.request_id;
   options.create_fingerprint = identity.fingerprint;
   options.create_revision = identity.create_revision;
-  SessionPtr session = std::make_shared<Session>(
-      options, LogFor(std::move(store), identity.settings.durability), Session::Content::kStored);
+  SessionPtr session = std::make_shared<Session>(options, LogFor(std::move(store), identity.settings),
+                                                 Session::Content::kStored);
   if (!identity.request_id.empty()) {
     SessionInfo created = session->Outline();
     created.state = SessionState::kLoaded;

@@ -40,6 +40,7 @@ struct SessionSeed {
   Mesh mesh;                             ///< of any revision, whatever relations it stores; no batch is open
   absl::Time commit_time = absl::Now();  ///< of mesh.revision()
   absl::Time create_time = absl::Now();
+  RevisionNote note = {};
   // For retries: the fingerprint is of all that tells the request from others, the name too.
   std::string request_id = {};
   uint64_t fingerprint = 0;
@@ -143,7 +144,8 @@ class SessionRegistry {
   absl::StatusOr<std::unique_ptr<SessionLog>> StoreSeed(const SessionSeed& seed,
                                                         const SessionIdentity& identity);
   absl::StatusOr<SessionPtr> OpenStored(const std::string& name) ABSL_EXCLUSIVE_LOCKS_REQUIRED(create_mu_);
-  std::unique_ptr<SessionLog> LogFor(std::unique_ptr<SessionStore> store, SessionDurability durability) const;
+  std::unique_ptr<SessionLog> LogFor(std::unique_ptr<SessionStore> store,
+                                     const SessionSettings& settings) const;
 
   // registry_unloading.cc
   /// Puts others in the place of those that are to go, which nobody can find any more.

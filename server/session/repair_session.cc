@@ -85,9 +85,10 @@ class SessionRepair {
     outcome_.revision = mesh.revision();
     if (remembered_ != nullptr) return {};
     remembered_ = std::make_shared<const RepairOutcome>(std::move(outcome_));
-    if (!once_) return {LoggedCall::kRepair};
+    if (!once_) return {LoggedCall::kRepair, {}, 0, {}, request_.note};
     session_.RememberRepair(request_.request_id, fingerprint_, remembered_, BytesOf(*remembered_));
-    return {LoggedCall::kRepair, request_.request_id, fingerprint_, EncodeAnswer(*remembered_)};
+    return {LoggedCall::kRepair, request_.request_id, fingerprint_, EncodeAnswer(*remembered_),
+            request_.note};
   }
 
   std::shared_ptr<const RepairOutcome> outcome() const { return remembered_; }
@@ -128,6 +129,7 @@ absl::StatusOr<std::shared_ptr<const RepairOutcome>> RepairSession(Session& sess
                                                                    const StopSignal& stop,
                                                                    absl::FunctionRef<void(size_t)> done) {
   DYNMESH_RETURN_IF_ERROR(CheckRequestId(request.request_id));
+  DYNMESH_RETURN_IF_ERROR(CheckNote(request.note));
   if (request.steps.size() > kMaxRepairSteps) {
     return BadField("steps", absl::StrCat("a repair has at most ", kMaxRepairSteps, " steps"));
   }

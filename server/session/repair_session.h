@@ -22,6 +22,7 @@ struct RepairRequest {
   absl::optional<int64_t> if_revision = absl::nullopt;
   std::string request_id = {};  ///< empty: none; ignored when validate_only
   bool validate_only = false;
+  RevisionNote note = {};
 };
 inline constexpr size_t kMaxRepairSteps = 20;
 

@@ -57,8 +57,8 @@ size_t BytesOf(const BatchResult& result) {
 }
 
 LoggedRequest RequestOf(const ApplyOptions& options, uint64_t fingerprint, const BatchResult& result) {
-  if (options.request_id.empty()) return {LoggedCall::kEdit};
-  return {LoggedCall::kEdit, options.request_id, fingerprint, EncodeAnswer(result)};
+  if (options.request_id.empty()) return {LoggedCall::kEdit, {}, 0, {}, options.note};
+  return {LoggedCall::kEdit, options.request_id, fingerprint, EncodeAnswer(result), options.note};
 }
 
 bool Grows(const Edit& edit) {
@@ -128,6 +128,7 @@ Session::Session(const Options& options, std::shared_ptr<SessionLog> log, Conten
       history_(options.limits),
       num_updates_(options.num_updates),
       checks_(options.settings.checks),
+      retention_(options.settings.retention),
       spatial_(options.limits.max_session_bytes),
       followers_(std::make_shared<FollowerList>(options.limits.max_followers)),
       deltas_(*this) {
@@ -183,6 +184,7 @@ SessionInfo Session::Describe(const Mesh& mesh, const MeshSummary& summary, absl
   info.settings.durability = options_.settings.durability;
   info.settings.duplicates = duplicates();
   info.settings.checks = checks();
+  info.settings.retention = retention();
   info.etag = EtagAt(info.revision);
   info.create_time = create_time_;
   info.update_time = update_time;
@@ -197,6 +199,7 @@ SessionInfo Session::Describe(const Mesh& mesh, const MeshSummary& summary, absl
 absl::StatusOr<Session::AnswerPtr> Session::Apply(absl::Span<const Edit> edits, const ApplyOptions& options,
                                                   const StopSignal& stop) {
   DYNMESH_RETURN_IF_ERROR(CheckRequestId(options.request_id));
+  DYNMESH_RETURN_IF_ERROR(CheckNote(options.note));
   DYNMESH_RETURN_IF_ERROR(CheckBatchSize(edits, limits()));
   const bool once = !options.request_id.empty() && !options.validate_only;
   const uint64_t fingerprint = once ? FingerprintOf(edits, options) : 0;
@@ -405,6 +408,11 @@ absl::Status Session::Update(const SettingsUpdate& update, absl::string_view eta
       MutexLock settings_lock(&settings_mu_);
       checks_ = *update.checks;
     }
+    if (update.retention.has_value()) {
+      MutexLock settings_lock(&settings_mu_);
+      retention_ = *update.retention;
+      if (log_ != nullptr) log_->SetRetention(retention_);
+    }
     ++num_updates_;
   }
   return log_ == nullptr ? absl::OkStatus() : StoreIdentity();
@@ -414,9 +422,9 @@ absl::Status Session::CheckEmpty() const {
   return revision() == 0 ? absl::OkStatus() : SessionNotEmpty(name(), revision());
 }
 
-absl::Status Session::Adopt(Mesh& mesh) {
+absl::Status Session::Adopt(Mesh& mesh, const LoggedRequest& request) {
   DYNMESH_RETURN_IF_ERROR(CheckEmpty());  // else the lock may be busy for long
-  if (log_ != nullptr) DYNMESH_RETURN_IF_ERROR(StoreImport(mesh));
+  if (log_ != nullptr) DYNMESH_RETURN_IF_ERROR(StoreImport(mesh, request));
   {
     WriterMutexLock lock(&mu_);
     const absl::Status adopted =

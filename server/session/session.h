@@ -18,6 +18,7 @@
 #include "absl/time/time.h"
 #include "absl/types/optional.h"
 #include "absl/types/span.h"
+#include "core/edit/restore_batches.h"
 #include "core/edit/run_batch.h"
 #include "core/edit/transaction.h"
 #include "core/mesh/mesh.h"
@@ -46,6 +47,7 @@ struct ApplyOptions {
   bool report_lineage = false;  ///< of at most kMaxLineage elements
   /// kTouched takes an as_of_revision.
   ConflictPolicy conflict_policy = ConflictPolicy::kNone;
+  RevisionNote note = {};
 };
 
 /// How batches are to be undone or redone; the fields are those of UndoEditsRequest.
@@ -54,12 +56,13 @@ struct HistoryOptions {
   absl::optional<int64_t> if_revision = absl::nullopt;
   std::string request_id = {};  ///< as of ApplyOptions
   bool validate_only = false;
+  RevisionNote note = {};
 };
 
 /// What undoing or redoing did or, for validate_only, would have done.
 struct HistoryResult {
   int64_t revision = 0;  ///< after it; for validate_only: before
-  uint32_t count = 0;    ///< of batches
+  uint32_t count = 0;    ///< of batches; 0 for one that went back to a revision
   Checksum checksum;
   std::array<uint32_t, kNumEntityKinds> counts = {};
   uint32_t undoable_batches = 0;  ///< after it
@@ -113,7 +116,7 @@ class Session : public std::enable_shared_from_this<Session> {
     // Of the request that created it, which its log's store remembers.
     std::string create_request_id = {};
     uint64_t create_fingerprint = 0;
-    int64_t create_revision = 0;             ///< at which it began
+    int64_t create_revision = 0;  ///< at which it began
     // Of one that was loaded before.
     absl::optional<absl::Time> update_time = absl::nullopt;
     uint64_t num_updates = 0;                ///< of settings, which etags tell of
@@ -191,6 +194,11 @@ class Session : public std::enable_shared_from_this<Session> {
   /// The last revision that is on disk; without a log the last one. Never waits.
   int64_t durable_revision() const { return log_ == nullptr ? revision() : log_->durable_revision(); }
 
+  absl::Status WaitUntilDurable(int64_t revision);
+
+  /// What keeps it on disk, and earlier revisions; null: nothing does.
+  SessionLog* log() const { return log_.get(); }
+
   /// Calls fn under the reader lock and returns what it returns.
   absl::Status Read(absl::FunctionRef<absl::Status(const SessionView&)> fn) const ABSL_LOCKS_EXCLUDED(mu_);
 
@@ -242,6 +250,20 @@ class Session : public std::enable_shared_from_this<Session> {
       HistoryMove move, const HistoryOptions& options, const StopSignal& stop = StopSignal::Never())
       ABSL_LOCKS_EXCLUDED(mu_);
 
+  /// Puts the session back to what it was, all or nothing, as one revision, which can be undone: `then` is
+  /// its mesh of an earlier revision (MeshAt()). options.count is not used. Errors: ABORTED
+  /// REVISION_MISMATCH; INVALID_ARGUMENT REQUEST_ID_REUSED; RESOURCE_EXHAUSTED; those of `stop`. Nothing
+  /// changed then. Cost: a scan of stamps, and what differs.
+  absl::StatusOr<std::shared_ptr<const HistoryResult>> RestoreTo(const Mesh& then,
+                                                                 const HistoryOptions& options,
+                                                                 const StopSignal& stop = StopSignal::Never())
+      ABSL_LOCKS_EXCLUDED(mu_);
+  /// What a request to go back to `revision` got, nullptr if there was none. Errors: INVALID_ARGUMENT
+  /// REQUEST_ID_REUSED.
+  absl::StatusOr<std::shared_ptr<const HistoryResult>> FindRestoration(int64_t revision,
+                                                                       const HistoryOptions& options) const
+      ABSL_LOCKS_EXCLUDED(mu_);
+
   /// What the import `request_id` gave, nullptr if there was none. Errors: INVALID_ARGUMENT
   /// REQUEST_ID_REUSED. Never waits.
   absl::StatusOr<std::shared_ptr<const ImportOutcome>> FindImport(absl::string_view request_id,
@@ -278,12 +300,19 @@ class Session : public std::enable_shared_from_this<Session> {
     return checks_;
   }
 
+  /// How far back earlier revisions are kept; its own, not the daemon's. Never waits.
+  Retention retention() const ABSL_LOCKS_EXCLUDED(settings_mu_) {
+    MutexLock lock(&settings_mu_);
+    return retention_;
+  }
+
   /// FAILED_PRECONDITION SESSION_NOT_EMPTY unless the session is at revision 0. Never waits.
   absl::Status CheckEmpty() const;
 
   /// Makes `mesh`, which is at revision 1, the content. It should store the relations that this does: else
   /// they are switched under the lock. Errors: as CheckEmpty; RESOURCE_EXHAUSTED. Nothing changed then.
-  absl::Status Adopt(Mesh& mesh) ABSL_LOCKS_EXCLUDED(mu_);
+  absl::Status Adopt(Mesh& mesh, const LoggedRequest& request = {LoggedCall::kImport})
+      ABSL_LOCKS_EXCLUDED(mu_);
 
   void RememberImport(const std::string& request_id, uint64_t fingerprint,
                       std::shared_ptr<const ImportOutcome> outcome) ABSL_LOCKS_EXCLUDED(imports_mu_);
@@ -316,10 +345,21 @@ class Session : public std::enable_shared_from_this<Session> {
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
   absl::StatusOr<BatchEnding> EditLocked(absl::FunctionRef<absl::StatusOr<BatchEnding>(Mesh&)> edit)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
-  absl::StatusOr<HistoryAnswerPtr> MoveOnce(HistoryMove move, const HistoryOptions& options,
-                                            const StopSignal& stop) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
+  /// What a request with an id got before; else what answer_now() says, which is remembered.
+  absl::StatusOr<HistoryAnswerPtr> AnswerOnce(
+      const HistoryOptions& options, const LoggedRequest& request,
+      absl::FunctionRef<absl::StatusOr<HistoryAnswerPtr>()> answer_now) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
   absl::StatusOr<HistoryAnswerPtr> MoveLocked(HistoryMove move, const HistoryOptions& options,
-                                              uint64_t fingerprint, const StopSignal& stop)
+                                              const LoggedRequest& request, const StopSignal& stop)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
+  absl::StatusOr<HistoryAnswerPtr> RestoreLocked(const Mesh& then, const HistoryOptions& options,
+                                                 const LoggedRequest& request, const StopSignal& stop)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
+  absl::StatusOr<RestoredBatches> RunRestore(
+      const HistoryOptions& options, const StopSignal& stop,
+      absl::FunctionRef<absl::StatusOr<RestoredBatches>(const RestoreOptions&)> restore)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
+  HistoryAnswerPtr Restored(HistoryResult result, const HistoryOptions& options, const LoggedRequest& request)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
   /// The result of fn(), which edits mesh_. When that throws, an edit has been left half way: the session is
   /// damaged then, and its error is returned.
@@ -344,6 +384,7 @@ class Session : public std::enable_shared_from_this<Session> {
   void Load();
   void StoreRelationsAgain(Mesh& mesh) const;
   absl::Status LoadLocked(RecoveredSession& recovered) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
+  absl::Status ForgetWrongOrigin(RecoveredSession& recovered) const;
   absl::Status RememberAgain(const LoggedRequest& request) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
   /// Sends the batch that was just committed to the log, if there is one. What fails there is told to those
   /// who await its revision.
@@ -351,7 +392,7 @@ class Session : public std::enable_shared_from_this<Session> {
   void StartCheckpoint();
   void WriteCheckpoint();
   /// Stores what is to be adopted. After success nobody else edits until that is done.
-  absl::Status StoreImport(const Mesh& mesh) ABSL_LOCKS_EXCLUDED(mu_);
+  absl::Status StoreImport(const Mesh& mesh, const LoggedRequest& request) ABSL_LOCKS_EXCLUDED(mu_);
   absl::Status StoreIdentity() ABSL_LOCKS_EXCLUDED(mu_);
 
   // session_unloading.cc
@@ -389,6 +430,7 @@ class Session : public std::enable_shared_from_this<Session> {
   Mutex identity_mu_;  ///< held while the identity is stored
   mutable Mutex settings_mu_;
   CheckSettings checks_ ABSL_GUARDED_BY(settings_mu_);
+  Retention retention_ ABSL_GUARDED_BY(settings_mu_);  ///< its own; the log has it with the daemon's
 
   mutable Mutex imports_mu_;
   AnswerMemory<ImportOutcome> imports_ ABSL_GUARDED_BY(imports_mu_);

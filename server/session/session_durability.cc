@@ -46,6 +46,7 @@ void Session::Load() {
   absl::StatusOr<RecoveredSession> recovered;
   const absl::Status read = CatchExceptions([&] {
     recovered = RecoverSession(log_->store(), limits());
+    if (recovered.ok()) DYNMESH_RETURN_IF_ERROR(ForgetWrongOrigin(*recovered));
     if (recovered.ok()) StoreRelationsAgain(recovered->mesh);
     return recovered.status();
   });
@@ -78,7 +79,8 @@ void Session::StoreRelationsAgain(Mesh& mesh) const {
 }
 
 absl::Status Session::LoadLocked(RecoveredSession& recovered) {
-  log_->NoteStored(recovered.records, recovered.checkpoint_revision, recovered.changed_pages);
+  log_->NoteStored(std::move(recovered.stored), recovered.changed_pages);
+  if (recovered.origin.has_value()) DYNMESH_RETURN_IF_ERROR(RememberAgain(recovered.origin->request));
   for (const LoggedRequest& request : recovered.requests) DYNMESH_RETURN_IF_ERROR(RememberAgain(request));
   mesh_ = std::move(recovered.mesh);
   Committed();
@@ -87,18 +89,35 @@ absl::Status Session::LoadLocked(RecoveredSession& recovered) {
   return absl::OkStatus();
 }
 
+/// One of a later revision than the session has was never made: a crash came in between.
+absl::Status Session::ForgetWrongOrigin(RecoveredSession& recovered) const {
+  if (!recovered.origin.has_value() || recovered.origin->revision <= recovered.mesh.revision()) {
+    return absl::OkStatus();
+  }
+  recovered.origin.reset();
+  return log_->store().DeleteValue(kOriginName);
+}
+
 absl::Status Session::RememberAgain(const LoggedRequest& request) {
+  if (request.request_id.empty()) return absl::OkStatus();
   switch (request.call) {
     case LoggedCall::kEdit:
       return RememberIn(answers_, request, DecodeBatchResult(request.answer));
-    case LoggedCall::kHistory:
+    case LoggedCall::kUndo:
+    case LoggedCall::kRedo:
+    case LoggedCall::kRestore:
       return RememberIn(history_answers_, request, DecodeHistoryResult(request.answer));
     case LoggedCall::kRepair: {
       MutexLock lock(&repairs_mu_);
       return RememberIn(repairs_, request, DecodeRepairOutcome(request.answer));
     }
+    case LoggedCall::kImport: {
+      MutexLock lock(&imports_mu_);
+      return RememberIn(imports_, request, DecodeImportOutcome(request.answer));
+    }
     case LoggedCall::kAdaptation:
-      break;  // has none
+    case LoggedCall::kCreation:  // the registry remembers it
+      break;
   }
   return absl::OkStatus();
 }
@@ -129,6 +148,10 @@ void Session::AwaitAcknowledged(int64_t revision, Done done) {
 
 absl::Status Session::WaitUntilAcknowledged(int64_t revision) {
   return log_ == nullptr ? absl::OkStatus() : log_->WaitUntilAcknowledged(revision);
+}
+
+absl::Status Session::WaitUntilDurable(int64_t revision) {
+  return log_ == nullptr ? absl::OkStatus() : log_->WaitUntilDurable(revision);
 }
 
 void Session::AwaitDurable(int64_t revision, Done done) {
@@ -169,14 +192,14 @@ void Session::WriteCheckpoint() {
 // ---- What is stored beside batches ----
 
 // Edits meanwhile would be no part of what is stored.
-absl::Status Session::StoreImport(const Mesh& mesh) {
+absl::Status Session::StoreImport(const Mesh& mesh, const LoggedRequest& request) {
   {
     WriterMutexLock lock(&mu_);
     DYNMESH_RETURN_IF_ERROR(CheckEditable());
     DYNMESH_RETURN_IF_ERROR(CheckEmpty());
     stores_import_ = true;
   }
-  const absl::Status stored = CatchExceptions([&] { return log_->StoreAll(mesh, absl::Now()); });
+  const absl::Status stored = CatchExceptions([&] { return log_->StoreAll(mesh, absl::Now(), request); });
   if (stored.ok()) return stored;
   WriterMutexLock lock(&mu_);
   stores_import_ = false;
@@ -192,6 +215,7 @@ absl::Status Session::StoreIdentity() {
                            options_.create_fingerprint,
                            options_.create_revision};
   identity.settings.checks = checks();
+  identity.settings.retention = retention();
   DYNMESH_RETURN_IF_ERROR(Read([&](const SessionView& view) {
     identity.settings.stored_relations = StoredRelationsOf(view.mesh);
     return absl::OkStatus();

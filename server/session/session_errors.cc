@@ -26,6 +26,36 @@ absl::Status RevisionInFuture(int64_t requested, int64_t actual) {
                    {{"requested", absl::StrCat(requested)}, {"actual", absl::StrCat(actual)}});
 }
 
+absl::Status RevisionGone(int64_t requested, int64_t oldest) {
+  return MakeError(absl::StatusCode::kOutOfRange, reason::kRevisionGone,
+                   absl::StrCat("revision ", requested, " is kept no more: the oldest one is ", oldest),
+                   {{"requested", absl::StrCat(requested)}, {"oldest", absl::StrCat(oldest)}});
+}
+
+absl::Status NoHistory(absl::string_view session) {
+  return FailedPrecondition(
+      reason::kNoHistory,
+      absl::StrCat("session ", session, " is not kept on disk, so only what it is now can be had"),
+      {{"session", std::string(session)}});
+}
+
+absl::Status SnapshotNotFound(absl::string_view name) {
+  return MakeError(absl::StatusCode::kNotFound, reason::kSnapshotNotFound,
+                   absl::StrCat("there is no snapshot ", name), {{"snapshot", std::string(name)}});
+}
+
+absl::Status BadSnapshotName() {
+  return InvalidArgument(
+      reason::kBadSnapshotName,
+      "a snapshot's name has 1-64 characters of [A-Za-z0-9_.-] and starts with a letter or a digit",
+      {{"field", "name"}});
+}
+
+absl::Status SnapshotExists(absl::string_view name) {
+  return MakeError(absl::StatusCode::kAlreadyExists, reason::kSnapshotExists,
+                   absl::StrCat("there is a snapshot ", name, " already"), {{"snapshot", std::string(name)}});
+}
+
 absl::Status RevisionMismatch(int64_t expected, int64_t actual) {
   return MakeError(absl::StatusCode::kAborted, reason::kRevisionMismatch,
                    absl::StrCat("the session is at revision ", actual, ", not ", expected),

@@ -25,6 +25,22 @@ absl::Status DeadlinePassed();
 /// OUT_OF_RANGE REVISION_IN_FUTURE, metadata requested and actual.
 absl::Status RevisionInFuture(int64_t requested, int64_t actual);
 
+/// OUT_OF_RANGE REVISION_GONE, metadata requested and oldest: this and all later ones can be had.
+absl::Status RevisionGone(int64_t requested, int64_t oldest);
+
+/// FAILED_PRECONDITION NO_HISTORY, metadata session: it is not kept on disk, so only what it is now can be
+/// had.
+absl::Status NoHistory(absl::string_view session);
+
+/// NOT_FOUND SNAPSHOT_NOT_FOUND, metadata snapshot.
+absl::Status SnapshotNotFound(absl::string_view name);
+
+/// INVALID_ARGUMENT BAD_SNAPSHOT_NAME: it is not made as those of sessions.
+absl::Status BadSnapshotName();
+
+/// ALREADY_EXISTS SNAPSHOT_EXISTS, metadata snapshot.
+absl::Status SnapshotExists(absl::string_view name);
+
 /// ABORTED REVISION_MISMATCH, metadata expected and actual.
 absl::Status RevisionMismatch(int64_t expected, int64_t actual);
 

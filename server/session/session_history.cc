@@ -1,10 +1,11 @@
-// Session::MoveInHistory: undoing and redoing batches.
+// Undoing and redoing batches, and going back to a revision.
 
 #include <deque>
 #include <memory>
 #include <utility>
 
 #include "core/edit/restore_batches.h"
+#include "core/edit/restore_revision.h"
 #include "core/mesh/error.h"
 #include "server/session/catch_exceptions.h"
 #include "server/session/durability/answer_codec.h"
@@ -25,9 +26,24 @@ uint64_t FingerprintOf(HistoryMove move, const HistoryOptions& options) {
   return fingerprint.value();
 }
 
-LoggedRequest RequestOf(const HistoryOptions& options, uint64_t fingerprint, const HistoryResult& result) {
-  if (options.request_id.empty()) return {LoggedCall::kHistory};
-  return {LoggedCall::kHistory, options.request_id, fingerprint, EncodeAnswer(result)};
+uint64_t FingerprintOf(int64_t revision, const HistoryOptions& options) {
+  constexpr uint64_t kRestore = 2;  // beside those of HistoryMove
+  Fingerprint fingerprint;
+  fingerprint.AddNumber(kRestore);
+  fingerprint.AddNumber(revision);
+  fingerprint.AddNumber(options.if_revision.has_value());
+  fingerprint.AddNumber(options.if_revision.value_or(0));
+  return fingerprint.value();
+}
+
+LoggedCall CallOf(HistoryMove move) {
+  return move == HistoryMove::kUndo ? LoggedCall::kUndo : LoggedCall::kRedo;
+}
+
+/// `request` with its answer.
+LoggedRequest Answered(LoggedRequest request, const HistoryResult& result) {
+  if (!request.request_id.empty()) request.answer = EncodeAnswer(result);
+  return request;
 }
 
 }  // namespace
@@ -36,52 +52,115 @@ absl::StatusOr<Session::HistoryAnswerPtr> Session::MoveInHistory(HistoryMove mov
                                                                  const HistoryOptions& options,
                                                                  const StopSignal& stop) {
   DYNMESH_RETURN_IF_ERROR(CheckRequestId(options.request_id));
+  DYNMESH_RETURN_IF_ERROR(CheckNote(options.note));
   const int64_t revision_before = revision();
   absl::StatusOr<HistoryAnswerPtr> answer;
   {
     WriterMutexLock lock(&mu_);
     DYNMESH_RETURN_IF_ERROR(CheckEditable());
-    const bool once = !options.request_id.empty() && !options.validate_only;
-    answer = once ? MoveOnce(move, options, stop) : MoveLocked(move, options, 0, stop);
+    const LoggedRequest request{
+        CallOf(move), options.request_id, FingerprintOf(move, options), {}, options.note};
+    answer = AnswerOnce(options, request, [&]() ABSL_NO_THREAD_SAFETY_ANALYSIS {
+      return MoveLocked(move, options, request, stop);
+    });
   }
   if (revision() != revision_before) WakeFollowers();
   return answer;
 }
 
-absl::StatusOr<Session::HistoryAnswerPtr> Session::MoveOnce(HistoryMove move, const HistoryOptions& options,
-                                                            const StopSignal& stop) {
-  const uint64_t fingerprint = FingerprintOf(move, options);
+absl::StatusOr<Session::HistoryAnswerPtr> Session::RestoreTo(const Mesh& then, const HistoryOptions& options,
+                                                             const StopSignal& stop) {
+  DYNMESH_RETURN_IF_ERROR(CheckRequestId(options.request_id));
+  DYNMESH_RETURN_IF_ERROR(CheckNote(options.note));
+  const int64_t revision_before = revision();
+  absl::StatusOr<HistoryAnswerPtr> answer;
+  {
+    WriterMutexLock lock(&mu_);
+    DYNMESH_RETURN_IF_ERROR(CheckEditable());
+    const LoggedRequest request{
+        LoggedCall::kRestore, options.request_id, FingerprintOf(then.revision(), options), {}, options.note};
+    answer = AnswerOnce(options, request, [&]() ABSL_NO_THREAD_SAFETY_ANALYSIS {
+      return RestoreLocked(then, options, request, stop);
+    });
+  }
+  if (revision() != revision_before) WakeFollowers();
+  return answer;
+}
+
+absl::StatusOr<Session::HistoryAnswerPtr> Session::FindRestoration(int64_t revision,
+                                                                   const HistoryOptions& options) const {
+  DYNMESH_RETURN_IF_ERROR(CheckRequestId(options.request_id));
+  if (options.request_id.empty() || options.validate_only) return HistoryAnswerPtr();
+  ReaderMutexLock lock(&mu_);
+  return history_answers_.Find(options.request_id, FingerprintOf(revision, options));
+}
+
+absl::StatusOr<Session::HistoryAnswerPtr> Session::AnswerOnce(
+    const HistoryOptions& options, const LoggedRequest& request,
+    absl::FunctionRef<absl::StatusOr<HistoryAnswerPtr>()> answer_now) {
+  if (options.request_id.empty() || options.validate_only) return answer_now();
   DYNMESH_ASSIGN_OR_RETURN(HistoryAnswerPtr remembered,
-                           history_answers_.Find(options.request_id, fingerprint));
+                           history_answers_.Find(options.request_id, request.fingerprint));
   if (remembered != nullptr) return remembered;
-  DYNMESH_ASSIGN_OR_RETURN(HistoryAnswerPtr answer, MoveLocked(move, options, fingerprint, stop));
-  history_answers_.Remember(options.request_id, fingerprint, answer, sizeof(HistoryResult));
+  DYNMESH_ASSIGN_OR_RETURN(HistoryAnswerPtr answer, answer_now());
+  history_answers_.Remember(options.request_id, request.fingerprint, answer, sizeof(HistoryResult));
   return answer;
 }
 
 absl::StatusOr<Session::HistoryAnswerPtr> Session::MoveLocked(HistoryMove move, const HistoryOptions& options,
-                                                              uint64_t fingerprint, const StopSignal& stop) {
+                                                              const LoggedRequest& request,
+                                                              const StopSignal& stop) {
   DYNMESH_RETURN_IF_ERROR(CheckRevision(options.if_revision));
   DYNMESH_ASSIGN_OR_RETURN(const std::vector<const BatchImage*> images, history_.Last(move, options.count));
-  MeshMeter meter({.used_bytes = 0, .max_bytes = limits().max_session_bytes}, stop);
-  absl::StatusOr<RestoredBatches> restored;
-  const absl::Status edited = RunEdit([&] {
-    restored = RestoreBatches(mesh_, images,
-                              {.dry_run = options.validate_only,
-                               .meter = meter,
-                               .max_image_bytes = history_.max_bytes(),
-                               .keeper = log_.get()});
-    return restored.status();
-  });
-  if (!edited.ok()) return edited;
-  HistoryResult result = {restored->revision, options.count, restored->checksum, restored->counts};
+  DYNMESH_ASSIGN_OR_RETURN(RestoredBatches restored,
+                           RunRestore(options, stop, [&](const RestoreOptions& restore) {
+                             return RestoreBatches(mesh_, images, restore);
+                           }));
   if (!options.validate_only) {
-    Moved(move, options.count, std::move(restored->images));
+    Moved(move, options.count, std::move(restored.images));
     Committed();
   }
+  return Restored({restored.revision, options.count, restored.checksum, restored.counts}, options, request);
+}
+
+absl::StatusOr<Session::HistoryAnswerPtr> Session::RestoreLocked(const Mesh& then,
+                                                                 const HistoryOptions& options,
+                                                                 const LoggedRequest& request,
+                                                                 const StopSignal& stop) {
+  DYNMESH_RETURN_IF_ERROR(CheckRevision(options.if_revision));
+  DYNMESH_ASSIGN_OR_RETURN(RestoredBatches restored,
+                           RunRestore(options, stop, [&](const RestoreOptions& restore) {
+                             return RestoreRevision(mesh_, then, restore);
+                           }));
+  if (!options.validate_only) {
+    if (!restored.images.empty()) Remember(std::move(restored.images.front()));
+    Committed();
+    MakeRoom(mesh_.memory_bytes());
+  }
+  return Restored({restored.revision, 0, restored.checksum, restored.counts}, options, request);
+}
+
+absl::StatusOr<RestoredBatches> Session::RunRestore(
+    const HistoryOptions& options, const StopSignal& stop,
+    absl::FunctionRef<absl::StatusOr<RestoredBatches>(const RestoreOptions&)> restore) {
+  MeshMeter meter({.used_bytes = 0, .max_bytes = limits().max_session_bytes}, stop);
+  absl::StatusOr<RestoredBatches> restored;
+  DYNMESH_RETURN_IF_ERROR(RunEdit([&] {
+    restored = restore({.dry_run = options.validate_only,
+                        .meter = meter,
+                        .max_image_bytes = history_.max_bytes(),
+                        .keeper = log_.get()});
+    return restored.status();
+  }));
+  return restored;
+}
+
+/// The answer of what was restored, which is logged if it is to stay.
+Session::HistoryAnswerPtr Session::Restored(HistoryResult result, const HistoryOptions& options,
+                                            const LoggedRequest& request) {
   result.undoable_batches = history_.size(HistoryMove::kUndo);
   result.redoable_batches = history_.size(HistoryMove::kRedo);
-  if (!options.validate_only) Log([&] { return RequestOf(options, fingerprint, result); });
+  if (!options.validate_only) Log([&] { return Answered(request, result); });
   return std::make_shared<const HistoryResult>(result);
 }
 

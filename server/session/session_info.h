@@ -15,6 +15,7 @@
 #include "core/mesh/box.h"
 #include "core/mesh/estimate.h"
 #include "core/mesh/mesh.h"
+#include "server/session/durability/retention.h"
 #include "server/session/mutex.h"
 #include "server/session/stop_signal.h"
 
@@ -43,12 +44,14 @@ struct SessionSettings {
   std::vector<Relation> stored_relations = {};                 ///< each of kStorableRelations, once
   CheckSettings checks = {};                                   ///< local ones, made on each batch
   SessionDurability durability = SessionDurability::kDefault;  ///< fixed when the session is created
+  Retention retention = {};                                    ///< of earlier revisions
 };
 
 /// Settings of a session that are to be changed; those that are absent stay.
 struct SettingsUpdate {
   absl::optional<std::vector<Relation>> stored_relations = absl::nullopt;
   absl::optional<CheckSettings> checks = absl::nullopt;
+  absl::optional<Retention> retention = absl::nullopt;
 };
 
 /// A relation that a session keeps stored, and the bytes of its table.

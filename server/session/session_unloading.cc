@@ -35,6 +35,7 @@ std::shared_ptr<Session> Session::Unload() {
   Options options = options_;
   options.uid = uid_;
   options.settings.checks = checks();
+  options.settings.retention = retention();
   options.num_updates = num_updates_;
   std::map<int, QuantizationGrid> grids = deltas_.grids();
   WriterMutexLock lock(&mu_);

@@ -32,6 +32,7 @@ class LocalCheckpoint final : public CheckpointWriter {
   LocalCheckpoint& operator=(const LocalCheckpoint&) = delete;
   ~LocalCheckpoint() override;
 
+  uint64_t number() const override { return number_; }
   absl::Status WritePage(PageKey page, std::string bytes) override;
   absl::Status DropPage(PageKey page) override;
   using CheckpointWriter::Commit;

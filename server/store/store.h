@@ -58,6 +58,9 @@ class CheckpointWriter {
  public:
   virtual ~CheckpointWriter() = default;
 
+  /// Checkpoint::number of what Commit() makes.
+  virtual uint64_t number() const = 0;
+
   /// Blocks while too much waits to be written. Writing a page again replaces it.
   virtual absl::Status WritePage(PageKey page, std::string bytes) = 0;
   /// The page is no part of the checkpoint. Dropping one that is not there does nothing.

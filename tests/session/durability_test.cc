@@ -93,7 +93,7 @@ TEST_F(DurabilityTest, ASessionIsTheSameAfterARestart) {
 }
 
 TEST_F(DurabilityTest, CheckpointsAmongEditsChangeNothingOfWhatIsFound) {
-  const SessionLogOptions often{.checkpoint_bytes = 3000, .kept_records = 10};
+  const SessionLogOptions often{.checkpoint_bytes = 3000, .kept_answers = {10, 1 << 20}};
   Restart(often);
   SessionPtr session = daemon_->NewSession("mesh", {.durability = SessionDurability::kAsync});
   RandomBatches batches(32);

@@ -12,15 +12,24 @@ namespace dynmesh {
 namespace {
 
 constexpr uint64_t kManifestFormat = 1;
-// An identity is of the format that it needs: so daemons of before know those that are as ever.
-constexpr uint64_t kPlainIdentityFormat = 1;
-constexpr uint64_t kIdentityFormat = 2;
 
-absl::StatusOr<uint64_t> ReadFormat(ByteReader& in, uint64_t newest, absl::string_view what) {
+absl::Status CheckManifestFormat(ByteReader& in, absl::string_view what) {
   const uint64_t format = in.Varint();
   if (!in.ok() || format == 0) return StoreDamaged(what);
-  if (format > newest) return StoreFormatNewer(format, newest);
-  return format;
+  return format <= kManifestFormat ? absl::OkStatus() : StoreFormatNewer(format, kManifestFormat);
+}
+
+void WriteRetention(const Retention& retention, ByteWriter& out) {
+  out.Fixed(retention.max_revisions);
+  out.Fixed(absl::ToInt64Microseconds(retention.max_age));
+  out.Fixed(retention.max_bytes);
+}
+
+bool ReadRetention(ByteReader& in, Retention& retention) {
+  retention.max_revisions = in.Fixed<uint32_t>();
+  retention.max_age = absl::Microseconds(in.Fixed<int64_t>());
+  retention.max_bytes = in.Fixed<uint64_t>();
+  return in.ok() && retention.max_age >= absl::ZeroDuration();
 }
 
 void WriteChecks(const CheckSettings& checks, ByteWriter& out) {
@@ -66,7 +75,8 @@ bool ReadSettings(ByteReader& in, SessionSettings& settings) {
   if (!known || duplicates > 1) return false;
   settings.durability = static_cast<SessionDurability>(durability);
   settings.duplicates = duplicates == 0 ? DuplicatePolicy::kKeep : DuplicatePolicy::kRefuse;
-  return ReadRelations(in, settings.stored_relations) && ReadChecks(in, settings.checks);
+  return ReadRelations(in, settings.stored_relations) && ReadChecks(in, settings.checks) &&
+         ReadRetention(in, settings.retention);
 }
 
 }  // namespace
@@ -75,6 +85,7 @@ std::string EncodeManifest(const SessionManifest& manifest) {
   ByteWriter out;
   out.Varint(kManifestFormat);
   out.Fixed(absl::ToUnixMicros(manifest.commit_time));
+  out.Fixed(manifest.newest);
   out.Bytes(manifest.head);
   return std::move(out).Take();
 }
@@ -82,47 +93,46 @@ std::string EncodeManifest(const SessionManifest& manifest) {
 absl::StatusOr<SessionManifest> DecodeManifest(absl::string_view bytes) {
   constexpr absl::string_view kWhat = "the manifest of a checkpoint is none";
   ByteReader in(bytes);
-  DYNMESH_RETURN_IF_ERROR(ReadFormat(in, kManifestFormat, kWhat).status());
+  DYNMESH_RETURN_IF_ERROR(CheckManifestFormat(in, kWhat));
   SessionManifest manifest;
   manifest.commit_time = absl::FromUnixMicros(in.Fixed<int64_t>());
+  manifest.newest = in.Fixed<int64_t>();
   manifest.head = std::string(in.Bytes(in.remaining()));
-  if (!in.done()) return StoreDamaged(kWhat);
+  if (!in.done() || manifest.newest < 0) return StoreDamaged(kWhat);
   return manifest;
 }
 
 std::string EncodeIdentity(const SessionIdentity& identity) {
   const SessionSettings& settings = identity.settings;
   ByteWriter out;
-  out.Varint(identity.create_revision == 0 ? kPlainIdentityFormat : kIdentityFormat);
+  out.Varint(kManifestFormat);
   out.Text(identity.uid);
   out.Fixed(absl::ToUnixMicros(identity.create_time));
   out.Text(identity.request_id);
   out.Fixed(identity.fingerprint);
+  out.Varint(static_cast<uint64_t>(identity.create_revision));
   out.Fixed(static_cast<uint8_t>(settings.durability));
   out.Fixed(static_cast<uint8_t>(settings.duplicates == DuplicatePolicy::kRefuse));
   out.Varint(settings.stored_relations.size());
   for (Relation relation : settings.stored_relations)
     out.Fixed(static_cast<uint8_t>(StorableIndex(relation)));
   WriteChecks(settings.checks, out);
-  if (identity.create_revision != 0) out.Varint(static_cast<uint64_t>(identity.create_revision));
+  WriteRetention(settings.retention, out);
   return std::move(out).Take();
 }
 
 absl::StatusOr<SessionIdentity> DecodeIdentity(absl::string_view bytes) {
   constexpr absl::string_view kWhat = "the identity of a session is none";
   ByteReader in(bytes);
-  DYNMESH_ASSIGN_OR_RETURN(const uint64_t format, ReadFormat(in, kIdentityFormat, kWhat));
+  DYNMESH_RETURN_IF_ERROR(CheckManifestFormat(in, kWhat));
   SessionIdentity identity;
   identity.uid = in.Text();
   identity.create_time = absl::FromUnixMicros(in.Fixed<int64_t>());
   identity.request_id = in.Text();
   identity.fingerprint = in.Fixed<uint64_t>();
-  bool sound = ReadSettings(in, identity.settings);
-  if (format > kPlainIdentityFormat) {
-    const uint64_t revision = in.Varint();
-    sound &= revision > 0 && revision <= kMaxStamp;
-    identity.create_revision = static_cast<int64_t>(revision);
-  }
+  const uint64_t revision = in.Varint();
+  identity.create_revision = static_cast<int64_t>(revision);
+  const bool sound = revision <= kMaxStamp && ReadSettings(in, identity.settings);
   if (!sound || !in.done()) return StoreDamaged(kWhat);
   return identity;
 }

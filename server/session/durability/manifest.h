@@ -11,11 +11,12 @@
 /// What a session's store holds beside records and pages. Formats of their own, sealed by the store.
 namespace dynmesh {
 
-/// The manifest of a checkpoint: format (varint, 1), time of the last commit (int64, us since 1970), head
-/// (core/archive/head.h).
+/// The manifest of a checkpoint: format (varint, 1), time of the last commit (int64, us since 1970), newest
+/// revision (int64), head (core/archive/head.h).
 struct SessionManifest {
   absl::Time commit_time;
   std::string head;
+  int64_t newest = 0;  ///< some pages may be as late as that
 };
 
 std::string EncodeManifest(const SessionManifest& manifest);
@@ -35,10 +36,10 @@ struct SessionIdentity {
 
 inline constexpr char kIdentityName[] = "identity";
 
-/// Format (varint, 1; 2 where it began at a later revision than 0), uid, creation (int64, us since 1970),
-/// request id, fingerprint (u64), durability (u8), duplicates (u8), stored relations (their places in
-/// kStorableRelations) and checks that are not as usual (name, severity, threshold), in format 2 the revision
-/// at which it began (varint); texts and lists begin with their length (varint).
+/// Format (varint, 1), uid, creation (int64, us since 1970), request id, fingerprint (u64), revision at which it
+/// began (varint), durability (u8), duplicates (u8), stored relations (their places in kStorableRelations), checks
+/// that are not as usual (name, severity, threshold), retention (revisions u32, age in us i64, bytes u64); texts
+/// and lists begin with their length (varint).
 std::string EncodeIdentity(const SessionIdentity& identity);
 /// Errors: as DecodeManifest.
 absl::StatusOr<SessionIdentity> DecodeIdentity(absl::string_view bytes);

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <limits>
+#include <string>
 #include <utility>
 
+#include "absl/strings/str_cat.h"
 #include "core/archive/rebuilder.h"
 #include "core/mesh/error.h"
 #include "server/session/durability/manifest.h"
@@ -20,32 +22,94 @@ uint64_t MaxBytes(const Limits& limits) {
   return 2 * bytes + kSlack;
 }
 
+/// A checkpoint that is being read again.
+struct Restart {
+  Rebuilder rebuilder;
+  SessionManifest manifest;
+};
+
+/// Reads its pages. REQUIRES: the store lists it.
+absl::StatusOr<Restart> ReadPages(SessionStore& store, const Checkpoint& checkpoint, const Limits& limits) {
+  DYNMESH_ASSIGN_OR_RETURN(SessionManifest manifest, DecodeManifest(checkpoint.manifest));
+  DYNMESH_ASSIGN_OR_RETURN(Rebuilder rebuilder,
+                           Rebuilder::Start(manifest.head, {.max_memory_bytes = MaxBytes(limits)}));
+  const auto add_page = [&](PageKey, absl::string_view bytes) { return rebuilder.AddPage(bytes); };
+  DYNMESH_RETURN_IF_ERROR(store.ReadCheckpoint(checkpoint.number, add_page).status());
+  return Restart{std::move(rebuilder), std::move(manifest)};
+}
+
+absl::StatusOr<std::vector<StoredCheckpoint>> ToStored(const std::vector<Checkpoint>& checkpoints) {
+  std::vector<StoredCheckpoint> stored;
+  for (const Checkpoint& checkpoint : checkpoints) {
+    DYNMESH_ASSIGN_OR_RETURN(const SessionManifest manifest, DecodeManifest(checkpoint.manifest));
+    stored.push_back({checkpoint.number, checkpoint.revision, manifest.newest});
+  }
+  return stored;
+}
+
+absl::StatusOr<std::vector<Snapshot>> ReadSnapshots(SessionStore& store) {
+  DYNMESH_ASSIGN_OR_RETURN(const absl::optional<std::string> bytes, store.GetValue(kSnapshotsName));
+  if (!bytes.has_value()) return std::vector<Snapshot>();
+  return DecodeSnapshots(*bytes);
+}
+
+absl::StatusOr<Checkpoint> FindCheckpoint(SessionStore& store, uint64_t number) {
+  DYNMESH_ASSIGN_OR_RETURN(std::vector<Checkpoint> checkpoints, store.ListCheckpoints());
+  for (Checkpoint& checkpoint : checkpoints) {
+    if (checkpoint.number == number) return std::move(checkpoint);
+  }
+  return CheckpointNotFound(number);
+}
+
 }  // namespace
 
 absl::StatusOr<RecoveredSession> RecoverSession(SessionStore& store, const Limits& limits) {
   RecoveredSession recovered;
   DYNMESH_ASSIGN_OR_RETURN(const std::vector<Checkpoint> checkpoints, store.ListCheckpoints());
   if (checkpoints.empty()) return StoreDamaged("the session has no checkpoint");
-  const Checkpoint* const checkpoint = &checkpoints.back();
-  DYNMESH_ASSIGN_OR_RETURN(const SessionManifest manifest, DecodeManifest(checkpoint->manifest));
-  recovered.commit_time = manifest.commit_time;
-  recovered.checkpoint_revision = checkpoint->revision;
-  DYNMESH_ASSIGN_OR_RETURN(Rebuilder rebuilder,
-                           Rebuilder::Start(manifest.head, {.max_memory_bytes = MaxBytes(limits)}));
-  const auto add_page = [&](PageKey, absl::string_view bytes) { return rebuilder.AddPage(bytes); };
-  DYNMESH_RETURN_IF_ERROR(store.ReadCheckpoint(checkpoint->number, add_page).status());
+  const Checkpoint& last = checkpoints.back();
+  DYNMESH_ASSIGN_OR_RETURN(recovered.stored.checkpoints, ToStored(checkpoints));
+  DYNMESH_ASSIGN_OR_RETURN(recovered.stored.snapshots, ReadSnapshots(store));
+  DYNMESH_ASSIGN_OR_RETURN(recovered.origin, ReadOrigin(store));
+  DYNMESH_ASSIGN_OR_RETURN(Restart restart, ReadPages(store, last, limits));
+  recovered.commit_time = restart.manifest.commit_time;
   const auto add_record = [&](int64_t revision, absl::string_view bytes) -> absl::Status {
     DYNMESH_ASSIGN_OR_RETURN(LogRecord record, DecodeLogRecord(bytes));
-    recovered.records.push_back({revision, bytes.size()});
+    recovered.stored.records.push_back({revision, bytes.size(), record.commit_time});
     if (!record.request.request_id.empty()) recovered.requests.push_back(std::move(record.request));
-    if (revision <= checkpoint->revision) return absl::OkStatus();
+    if (revision <= last.revision) return absl::OkStatus();
     recovered.commit_time = record.commit_time;
-    return rebuilder.AddRecord(record.batch);
+    return restart.rebuilder.AddRecord(record.batch);
   };
-  DYNMESH_RETURN_IF_ERROR(store.ReadRecords(store.trimmed_revision(), add_record));
-  recovered.changed_pages = rebuilder.changed_pages();
-  DYNMESH_ASSIGN_OR_RETURN(recovered.mesh, std::move(rebuilder).Finish());
+  recovered.stored.trimmed = store.trimmed_revision();
+  DYNMESH_RETURN_IF_ERROR(store.ReadRecords(recovered.stored.trimmed, add_record));
+  recovered.changed_pages = restart.rebuilder.changed_pages();
+  DYNMESH_ASSIGN_OR_RETURN(recovered.mesh, std::move(restart.rebuilder).Finish());
   return recovered;
+}
+
+absl::StatusOr<RecoveredRevision> RecoverRevision(SessionStore& store, const RevisionSource& source,
+                                                  const Limits& limits) {
+  DYNMESH_ASSIGN_OR_RETURN(const Checkpoint checkpoint, FindCheckpoint(store, source.checkpoint));
+  DYNMESH_ASSIGN_OR_RETURN(Restart restart, ReadPages(store, checkpoint, limits));
+  RecoveredRevision recovered{Mesh(), restart.manifest.commit_time};
+  const auto add_record = [&](int64_t, absl::string_view bytes) -> absl::Status {
+    DYNMESH_ASSIGN_OR_RETURN(const LogRecord record, DecodeLogRecord(bytes));
+    recovered.commit_time = record.commit_time;
+    return restart.rebuilder.AddRecord(record.batch);
+  };
+  DYNMESH_RETURN_IF_ERROR(store.ReadRecords(source.records, add_record));
+  DYNMESH_ASSIGN_OR_RETURN(recovered.mesh, std::move(restart.rebuilder).Finish());
+  if (recovered.mesh.revision() == source.revision()) return recovered;
+  return StoreDamaged(
+      absl::StrCat("revision ", source.revision(), " was found to be ", recovered.mesh.revision()));
+}
+
+absl::StatusOr<absl::optional<Origin>> ReadOrigin(SessionStore& store) {
+  DYNMESH_ASSIGN_OR_RETURN(const absl::optional<std::string> bytes, store.GetValue(kOriginName));
+  if (!bytes.has_value()) return absl::optional<Origin>();
+  DYNMESH_ASSIGN_OR_RETURN(Origin origin, DecodeOrigin(*bytes));
+  return absl::optional<Origin>(std::move(origin));
 }
 
 }  // namespace dynmesh

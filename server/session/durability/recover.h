@@ -5,10 +5,11 @@
 
 #include "absl/status/statusor.h"
 #include "absl/time/time.h"
+#include "absl/types/optional.h"
 #include "core/archive/dirty_pages.h"
 #include "core/mesh/mesh.h"
 #include "server/session/durability/log_record.h"
-#include "server/session/durability/session_log.h"
+#include "server/session/durability/retained_revisions.h"
 #include "server/session/limits.h"
 #include "server/store/store.h"
 
@@ -18,10 +19,16 @@ namespace dynmesh {
 struct RecoveredSession {
   Mesh mesh;  ///< without stored relations
   absl::Time commit_time;
-  int64_t checkpoint_revision = 0;
-  DirtyPages changed_pages;             ///< since the checkpoint
-  std::vector<StoredRecord> records;    ///< that the store holds
+  StoredRevisions stored;
+  absl::optional<Origin> origin;        ///< of a revision that was never made, if that is a later one
+  DirtyPages changed_pages;             ///< since the last checkpoint
   std::vector<LoggedRequest> requests;  ///< that have an id, of the records that are kept; the oldest first
+};
+
+/// What it was at one revision.
+struct RecoveredRevision {
+  Mesh mesh;  ///< without stored relations
+  absl::Time commit_time;
 };
 
 /// Reads a session from its last checkpoint and the records since.
@@ -29,6 +36,13 @@ struct RecoveredSession {
 /// STORE_DAMAGED, ARCHIVE_DAMAGED; RESOURCE_EXHAUSTED max_session_bytes. Cost: less than twice that of
 /// importing the same mesh, and some microseconds a record.
 absl::StatusOr<RecoveredSession> RecoverSession(SessionStore& store, const Limits& limits);
+
+/// Reads an earlier revision, or the last one. Errors and cost: as of RecoverSession.
+absl::StatusOr<RecoveredRevision> RecoverRevision(SessionStore& store, const RevisionSource& source,
+                                                  const Limits& limits);
+
+/// What the store says of the revision that the session began with.
+absl::StatusOr<absl::optional<Origin>> ReadOrigin(SessionStore& store);
 
 }  // namespace dynmesh
 

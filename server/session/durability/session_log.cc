@@ -50,7 +50,8 @@ SessionLog::SessionLog(std::unique_ptr<SessionStore> store, const SessionLogOpti
       store_(std::move(store)),
       executor_(executor),
       acknowledged_(std::make_shared<RevisionGate>(store_->last_revision(), executor)),
-      durable_(std::make_shared<RevisionGate>(store_->durable_revision(), executor)) {}
+      durable_(std::make_shared<RevisionGate>(store_->durable_revision(), executor)),
+      retained_(options.retention) {}
 
 void SessionLog::WatchDurable(absl::AnyInvocable<void()> watcher) {
   const auto shared = std::make_shared<absl::AnyInvocable<void()>>(std::move(watcher));
@@ -82,8 +83,7 @@ void SessionLog::Append(int64_t revision, absl::Time commit_time, const LoggedRe
   bytes_since_checkpoint_ += record.bytes.size();
   {
     MutexLock lock(&mu_);
-    records_.push_back({revision, record.bytes.size()});
-    record_bytes_ += record.bytes.size();
+    retained_.AddRecord({revision, record.bytes.size(), commit_time});
   }
   auto done = [revision, acknowledged = acknowledged_, durable = durable_](const absl::Status& status) {
     if (status.ok()) return acknowledged->Reach(revision);
@@ -98,15 +98,26 @@ void SessionLog::Fail(const absl::Status& status) {
   durable_->Fail(status);
 }
 
-absl::Status SessionLog::StoreAll(const Mesh& mesh, absl::Time commit_time) {
+absl::Status SessionLog::StoreAll(const Mesh& mesh, absl::Time commit_time, const LoggedRequest& request) {
   DYNMESH_RETURN_IF_ERROR(status());
-  DYNMESH_ASSIGN_OR_RETURN(const auto writer, store_->BeginCheckpoint(mesh.revision()));
+  const int64_t revision = mesh.revision();
+  DYNMESH_ASSIGN_OR_RETURN(const auto writer, store_->BeginCheckpoint(revision));
   DirtyPages all;
   all.AddAll(mesh);
-  for (PageId page : all.List()) DYNMESH_RETURN_IF_ERROR(Write(Encode(mesh, page), *writer));
-  DYNMESH_RETURN_IF_ERROR(writer->Commit(EncodeManifest({commit_time, EncodeHead(mesh)})));
-  acknowledged_->Reach(mesh.revision());
-  durable_->Reach(mesh.revision());
+  Origin origin{revision, 0, commit_time, request};
+  for (PageId page : all.List()) {
+    EncodedPage encoded = Encode(mesh, page);
+    origin.bytes += encoded.bytes.size();
+    DYNMESH_RETURN_IF_ERROR(Write(std::move(encoded), *writer));
+  }
+  if (revision > 0) DYNMESH_RETURN_IF_ERROR(store_->PutValue(kOriginName, EncodeOrigin(origin)));
+  DYNMESH_RETURN_IF_ERROR(writer->Commit(EncodeManifest({commit_time, EncodeHead(mesh), revision})));
+  {
+    MutexLock lock(&mu_);
+    retained_.Reset({{{writer->number(), revision, revision}}, {}, revision, {}});
+  }
+  acknowledged_->Reach(revision);
+  durable_->Reach(revision);
   return absl::OkStatus();
 }
 
@@ -116,7 +127,7 @@ absl::Status SessionLog::WriteCheckpoint(Reader read) {
   SessionManifest manifest;
   int64_t revision = 0;
   DYNMESH_RETURN_IF_ERROR(read([&](const Mesh& mesh, absl::Time commit_time) {
-    manifest = {commit_time, EncodeHead(mesh)};
+    manifest = {commit_time, EncodeHead(mesh), mesh.revision()};
     revision = mesh.revision();
     bytes_since_checkpoint_ = 0;
     MutexLock lock(&mu_);
@@ -125,11 +136,13 @@ absl::Status SessionLog::WriteCheckpoint(Reader read) {
   }));
   const absl::Status written = CatchExceptions([&]() -> absl::Status {
     DYNMESH_ASSIGN_OR_RETURN(const auto writer, store_->BeginCheckpoint(revision));
-    int64_t newest = revision;
-    DYNMESH_RETURN_IF_ERROR(WritePages(read, pages, *writer, newest));
+    DYNMESH_RETURN_IF_ERROR(WritePages(read, pages, *writer, manifest.newest));
     // Pages may tell of later revisions than the head: those must not vanish when these stay.
-    DYNMESH_RETURN_IF_ERROR(durable_->Await(newest));
-    return writer->Commit(EncodeManifest(manifest));
+    DYNMESH_RETURN_IF_ERROR(durable_->Await(manifest.newest));
+    DYNMESH_RETURN_IF_ERROR(writer->Commit(EncodeManifest(manifest), FormerCheckpoint::kKeep));
+    MutexLock lock(&mu_);
+    retained_.AddCheckpoint({writer->number(), revision, manifest.newest});
+    return absl::OkStatus();
   });
   if (!written.ok()) {
     MutexLock lock(&mu_);
@@ -140,21 +153,18 @@ absl::Status SessionLog::WriteCheckpoint(Reader read) {
     if (!kept.ok()) Fail(kept);  // a later checkpoint would not know of them
     return written;
   }
-  return store_->TrimRecords(TakeSuperfluous(revision));
+  return DropSuperfluous();
 }
 
-void SessionLog::NoteStored(const std::vector<StoredRecord>& records, int64_t checkpoint,
-                            const DirtyPages& changed) {
+void SessionLog::NoteStored(StoredRevisions stored, const DirtyPages& changed) {
   MutexLock lock(&mu_);
   dirty_.Add(changed);
-  records_.assign(records.begin(), records.end());
-  record_bytes_ = 0;
   uint64_t since = 0;
-  for (const StoredRecord& record : records) {
-    record_bytes_ += record.bytes;
-    if (record.revision > checkpoint) since += record.bytes;
+  for (const StoredRecord& record : stored.records) {
+    if (record.revision > stored.checkpoints.back().revision) since += record.bytes;
   }
   bytes_since_checkpoint_ = since;
+  retained_.Reset(std::move(stored));
 }
 
 void SessionLog::Rest() {
@@ -162,20 +172,19 @@ void SessionLog::Rest() {
   encoder_ = RecordEncoder();
   MutexLock lock(&mu_);
   dirty_ = DirtyPages();
-  records_ = std::deque<StoredRecord>();
-  record_bytes_ = 0;
+  retained_.Reset({});
 }
 
-int64_t SessionLog::TakeSuperfluous(int64_t revision) {
-  MutexLock lock(&mu_);
-  int64_t last = 0;
-  while (!records_.empty() && records_.front().revision <= revision &&
-         (records_.size() > options_.kept_records || record_bytes_ > options_.kept_bytes)) {
-    last = records_.front().revision;
-    record_bytes_ -= records_.front().bytes;
-    records_.pop_front();
+absl::Status SessionLog::DropSuperfluous() {
+  RetainedRevisions::Superfluous superfluous;
+  {
+    MutexLock lock(&mu_);
+    superfluous = retained_.TakeSuperfluous(options_.kept_answers, absl::Now());
   }
-  return last;
+  for (uint64_t checkpoint : superfluous.checkpoints) {
+    DYNMESH_RETURN_IF_ERROR(store_->DropCheckpoint(checkpoint));
+  }
+  return store_->TrimRecords(superfluous.records, superfluous.kept);
 }
 
 absl::Status SessionLog::WritePages(Reader read, const DirtyPages& pages, CheckpointWriter& writer,

@@ -3,7 +3,6 @@
 
 #include <atomic>
 #include <cstdint>
-#include <deque>
 #include <memory>
 #include <string>
 #include <vector>
@@ -12,12 +11,15 @@
 #include "absl/functional/any_invocable.h"
 #include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
 #include "absl/time/time.h"
 #include "core/archive/dirty_pages.h"
 #include "core/archive/record.h"
 #include "core/edit/batch_keeper.h"
 #include "core/mesh/mesh.h"
 #include "server/session/durability/log_record.h"
+#include "server/session/durability/retained_revisions.h"
 #include "server/session/durability/revision_gate.h"
 #include "server/session/executor.h"
 #include "server/session/mutex.h"
@@ -29,17 +31,14 @@ struct SessionLogOptions {
   Durability durability = Durability::kSync;  ///< what acknowledges an edit
   /// Records of so many bytes make another checkpoint due.
   uint64_t checkpoint_bytes = uint64_t{64} << 20;
-  /// So many of the last records stay when a checkpoint has made them superfluous, and so many bytes of them:
-  /// for the answers that retries get.
-  size_t kept_records = 4096;
-  uint64_t kept_bytes = uint64_t{64} << 20;
+  /// What stays when a checkpoint has made it superfluous: for the answers that retries get, and for those
+  /// who go back.
+  RetainedRevisions::AnswersToKeep kept_answers = {4096, uint64_t{64} << 20};
+  Retention retention = {kDefaultRetainedRevisions, absl::ZeroDuration(), kDefaultRetainedBytes};
 };
 
-/// A record that the store holds.
-struct StoredRecord {
-  int64_t revision = 0;
-  uint64_t bytes = 0;
-};
+/// Where a revision comes from, which stays for as long as this is held.
+using PinnedSource = std::shared_ptr<const RevisionSource>;
 
 /// Keeps a session in its store: a record of each batch, checkpoints from time to time.
 ///
@@ -75,22 +74,24 @@ class SessionLog final : public BatchKeeper {
   /// Calls `done` once an edit that made `revision` may be acknowledged, or what the store says against it.
   void AwaitAcknowledged(int64_t revision, Done done) { acknowledged_->Wait(revision, std::move(done)); }
   absl::Status WaitUntilAcknowledged(int64_t revision) { return acknowledged_->Await(revision); }
+  absl::Status WaitUntilDurable(int64_t revision) { return durable_->Await(revision); }
   /// The same for when it is on disk, so that followers may be told.
   void AwaitDurable(int64_t revision, Done done) { durable_->Wait(revision, std::move(done)); }
+  int64_t acknowledged_revision() const { return acknowledged_->reached(); }
   int64_t durable_revision() const { return durable_->reached(); }
   /// OK, or why the session takes no more edits until it is opened again.
   absl::Status status() const { return acknowledged_->status(); }
 
-  /// What the store holds already: records, in order, the revision of its checkpoint, and the pages that this
-  /// has not as they are. To be called before anything is appended.
-  void NoteStored(const std::vector<StoredRecord>& records, int64_t checkpoint, const DirtyPages& changed);
+  /// What the store holds already, and the pages that its last checkpoint has not as they are. To be called
+  /// before anything is appended.
+  void NoteStored(StoredRevisions stored, const DirtyPages& changed);
 
   /// The session is unloaded: frees what NoteStored() brings back. For whoever has the session's writer lock,
   /// when no checkpoint is under way.
   void Rest();
 
   /// Makes `mesh`, which no records lead to, what the store holds. Blocks until it is on disk.
-  absl::Status StoreAll(const Mesh& mesh, absl::Time commit_time);
+  absl::Status StoreAll(const Mesh& mesh, absl::Time commit_time, const LoggedRequest& request);
 
   /// Whether records have come to so much since the last checkpoint that another one is due.
   bool IsCheckpointDue() const { return bytes_since_checkpoint_ > options_.checkpoint_bytes; }
@@ -100,12 +101,31 @@ class SessionLog final : public BatchKeeper {
   /// until it is on disk.
   absl::Status WriteCheckpoint(Reader read);
 
+  // Earlier revisions (session_log_revisions.cc). Thread safety: full.
+
+  void SetRetention(const Retention& retention);
+  /// This and all later revisions can be had.
+  int64_t oldest_revision() const;
+  /// Errors: OUT_OF_RANGE REVISION_GONE, REVISION_IN_FUTURE. REQUIRES: this outlives what is returned.
+  absl::StatusOr<PinnedSource> PinRevision(int64_t revision);
+
+  std::vector<Snapshot> snapshots() const;
+  /// Errors: NOT_FOUND SNAPSHOT_NOT_FOUND.
+  absl::StatusOr<Snapshot> FindSnapshot(absl::string_view name) const;
+  /// Keeps a revision under a name; on disk when it returns. `snapshot` says name, revision, time and note.
+  /// Errors: those of PinRevision; ALREADY_EXISTS SNAPSHOT_EXISTS; RESOURCE_EXHAUSTED LIMIT_EXCEEDED
+  /// (max_snapshots); those of the store.
+  absl::Status AddSnapshot(Snapshot snapshot);
+  /// What only it needs goes with the next checkpoint. Errors: NOT_FOUND SNAPSHOT_NOT_FOUND; those of the
+  /// store.
+  absl::Status DeleteSnapshot(absl::string_view name);
+
   SessionStore& store() { return *store_; }
   const SessionLogOptions& options() const { return options_; }
 
  private:
-  /// The last one that nobody needs any more after a checkpoint of `revision`; 0: none.
-  int64_t TakeSuperfluous(int64_t revision) ABSL_LOCKS_EXCLUDED(mu_);
+  absl::Status DropSuperfluous();
+  absl::Status StoreSnapshots(std::vector<Snapshot> snapshots) ABSL_EXCLUSIVE_LOCKS_REQUIRED(snapshots_mu_);
   absl::Status WritePages(Reader read, const DirtyPages& pages, CheckpointWriter& writer, int64_t& newest);
 
   const SessionLogOptions options_;
@@ -117,10 +137,10 @@ class SessionLog final : public BatchKeeper {
   RecordEncoder encoder_;
   std::string batch_;  ///< of the batch kept last
   std::atomic<uint64_t> bytes_since_checkpoint_{0};
-  Mutex mu_;
+  Mutex snapshots_mu_;  ///< held while the list of snapshots is stored
+  mutable Mutex mu_;
   DirtyPages dirty_ ABSL_GUARDED_BY(mu_);
-  std::deque<StoredRecord> records_ ABSL_GUARDED_BY(mu_);  ///< that the store holds
-  uint64_t record_bytes_ ABSL_GUARDED_BY(mu_) = 0;
+  RetainedRevisions retained_ ABSL_GUARDED_BY(mu_);
 };
 
 }  // namespace dynmesh

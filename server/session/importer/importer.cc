@@ -5,8 +5,10 @@
 #include "absl/strings/str_cat.h"
 #include "absl/time/clock.h"
 #include "server/session/answer_memory.h"
+#include "server/session/durability/answer_codec.h"
 #include "server/session/fingerprint.h"
 #include "server/session/heap.h"
+#include "server/session/revisions.h"
 #include "server/session/session_errors.h"
 #include "spdlog/spdlog.h"
 
@@ -45,6 +47,7 @@ absl::StatusOr<std::unique_ptr<ImportGate::Ticket>> ImportGate::Enter() {
 absl::StatusOr<std::unique_ptr<Importer>> Importer::Start(SessionPtr session, ImportGate& gate,
                                                           const ImportOptions& options) {
   DYNMESH_RETURN_IF_ERROR(CheckRequestId(options.request_id));
+  DYNMESH_RETURN_IF_ERROR(CheckNote(options.note));
   DYNMESH_RETURN_IF_ERROR(CheckAnnounced(options, session->limits()));
   // A retry has to arrive in full before it is known to be one.
   if (options.request_id.empty() || options.validate_only) DYNMESH_RETURN_IF_ERROR(session->CheckEmpty());
@@ -62,12 +65,13 @@ Importer::Importer(SessionPtr session, std::unique_ptr<ImportGate::Ticket> ticke
 
 absl::StatusOr<ImportAnswer> Importer::Finish(ImportMonitor& monitor) {
   DYNMESH_RETURN_IF_ERROR(CheckCounts());
-  if (options_.request_id.empty() || options_.validate_only) return BuildAndAdopt(monitor);
+  if (options_.request_id.empty() || options_.validate_only) return BuildAndAdopt(monitor, 0);
   const uint64_t fingerprint = Fingerprint();
+  DYNMESH_RETURN_IF_ERROR(AwaitLoaded(*session_));  // else it does not know of the first one
   DYNMESH_ASSIGN_OR_RETURN(OutcomePtr remembered, session_->FindImport(options_.request_id, fingerprint));
   if (remembered != nullptr) return AnswerAgain(std::move(remembered), monitor);
   DYNMESH_RETURN_IF_ERROR(session_->CheckEmpty());
-  DYNMESH_ASSIGN_OR_RETURN(ImportAnswer answer, BuildAndAdopt(monitor));
+  DYNMESH_ASSIGN_OR_RETURN(ImportAnswer answer, BuildAndAdopt(monitor, fingerprint));
   session_->RememberImport(options_.request_id, fingerprint, answer.outcome);
   return answer;
 }
@@ -111,7 +115,12 @@ absl::StatusOr<Mesh> Importer::Build(MeshBuilder& builder) {
   return mesh;
 }
 
-absl::StatusOr<ImportAnswer> Importer::BuildAndAdopt(ImportMonitor& monitor) {
+LoggedRequest Importer::RequestOf(uint64_t fingerprint, const ImportOutcome& outcome) const {
+  if (options_.request_id.empty()) return {LoggedCall::kImport, {}, 0, {}, options_.note};
+  return {LoggedCall::kImport, options_.request_id, fingerprint, EncodeAnswer(outcome), options_.note};
+}
+
+absl::StatusOr<ImportAnswer> Importer::BuildAndAdopt(ImportMonitor& monitor, uint64_t fingerprint) {
   const absl::Time begin = absl::Now();
   MeshBuilder builder(BuildOptions(), session_->limits(), monitor);
   DYNMESH_ASSIGN_OR_RETURN(Mesh mesh, Build(builder));
@@ -125,7 +134,9 @@ absl::StatusOr<ImportAnswer> Importer::BuildAndAdopt(ImportMonitor& monitor) {
   }
   outcome->revision = outcome->info.revision;
   if (monitor.cancelled()) return CallCancelled();
-  if (!options_.validate_only) DYNMESH_RETURN_IF_ERROR(session_->Adopt(mesh));
+  if (!options_.validate_only) {
+    DYNMESH_RETURN_IF_ERROR(session_->Adopt(mesh, RequestOf(fingerprint, *outcome)));
+  }
   spdlog::info("import session={} vertices={} cells={} validate_only={} build_ms={}", session_->name(),
                outcome->info.counts[0], outcome->info.counts[3], options_.validate_only,
                absl::ToInt64Milliseconds(absl::Now() - begin));

@@ -39,6 +39,7 @@ struct ImportOptions {
   bool validate_only = false;
   std::string request_id = {};
   SlotOrder slot_order = SlotOrder::kCaller;
+  RevisionNote note = {};
 };
 
 /// Counts the imports that are under way in a daemon, and the bytes that they have staged. Thread safety:
@@ -109,7 +110,8 @@ class Importer {
   uint64_t Fingerprint() const;
   BulkOptions BuildOptions() const;
   absl::StatusOr<ImportAnswer> AnswerAgain(OutcomePtr remembered, ImportMonitor& monitor);
-  absl::StatusOr<ImportAnswer> BuildAndAdopt(ImportMonitor& monitor);
+  absl::StatusOr<ImportAnswer> BuildAndAdopt(ImportMonitor& monitor, uint64_t fingerprint);
+  LoggedRequest RequestOf(uint64_t fingerprint, const ImportOutcome& outcome) const;
   absl::StatusOr<Mesh> Build(MeshBuilder& builder);
 
   const SessionPtr session_;
