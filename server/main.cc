@@ -41,12 +41,17 @@ ABSL_FLAG(uint64_t, checkpoint_bytes, dynmesh::ServerOptions().checkpoint_bytes,
           "Log of a session before another checkpoint is written, which keeps loading it quick");
 ABSL_FLAG(absl::Duration, idle_timeout, dynmesh::ServerOptions().idle_timeout,
           "Sessions in data_dir that nobody has used or followed for so long are unloaded, until somebody "
-          "uses them; "
-          "what undoes batches is lost. 0: never");
+          "uses them; what undoes batches is lost. 0: never");
 ABSL_FLAG(uint64_t, max_loaded_bytes, dynmesh::ServerOptions().max_loaded_bytes,
           "Memory of the sessions in data_dir that are loaded: beyond it the least recently used ones that "
-          "nobody uses "
-          "are unloaded. 0: however much");
+          "nobody uses are unloaded. 0: however much");
+ABSL_FLAG(
+    uint32_t, retain_revisions, dynmesh::ServerOptions().retention.max_revisions,
+    "Last revisions of a session in data_dir that can be gone back to; 0: all. A session can say otherwise");
+ABSL_FLAG(absl::Duration, retain_age, dynmesh::ServerOptions().retention.max_age,
+          "The same by their age; 0: of any age");
+ABSL_FLAG(uint64_t, retain_bytes, dynmesh::ServerOptions().retention.max_bytes,
+          "The same by the disk that their records take; 0: however much");
 ABSL_FLAG(std::string, ready_file, "",
           "File that is written, one address a line, when the server is serving; removed at the end");
 ABSL_FLAG(std::string, log_level, "info", "trace, debug, info, warn, error or off");
@@ -173,6 +178,8 @@ ServerOptions OptionsFromFlags() {
   options.data_dir = absl::GetFlag(FLAGS_data_dir);
   options.async_delay = absl::GetFlag(FLAGS_async_delay);
   options.checkpoint_bytes = absl::GetFlag(FLAGS_checkpoint_bytes);
+  options.retention = {absl::GetFlag(FLAGS_retain_revisions), absl::GetFlag(FLAGS_retain_age),
+                       absl::GetFlag(FLAGS_retain_bytes)};
   options.idle_timeout = absl::GetFlag(FLAGS_idle_timeout);
   options.max_loaded_bytes = absl::GetFlag(FLAGS_max_loaded_bytes);
   options.limits = LimitsFromFlags();

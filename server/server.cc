@@ -23,6 +23,7 @@
 #include "server/rpc/adapt_service.h"
 #include "server/rpc/checks_service.h"
 #include "server/rpc/edits_service.h"
+#include "server/rpc/history_service.h"
 #include "server/rpc/open_streams.h"
 #include "server/rpc/queries_service.h"
 #include "server/rpc/repairs_service.h"
@@ -37,10 +38,10 @@
 namespace dynmesh {
 namespace {
 
-constexpr const char* kServiceNames[] = {"dynmesh.v1.SessionService",     "dynmesh.v1.EditService",
-                                         "dynmesh.v1.QueryService",       "dynmesh.v1.CheckService",
-                                         "dynmesh.v1.RepairService",      "dynmesh.v1.AdaptService",
-                                         "dynmesh.v1.SubscriptionService"};
+constexpr const char* kServiceNames[] = {"dynmesh.v1.SessionService", "dynmesh.v1.EditService",
+                                         "dynmesh.v1.QueryService",   "dynmesh.v1.CheckService",
+                                         "dynmesh.v1.RepairService",  "dynmesh.v1.AdaptService",
+                                         "dynmesh.v1.HistoryService", "dynmesh.v1.SubscriptionService"};
 // gRPC refuses larger messages before we see them; up to there our own refusal names the limit.
 constexpr uint64_t kHardMessageFactor = 4;
 // Followers, and a daemon that drains, wait for as long.
@@ -148,6 +149,9 @@ absl::StatusOr<std::unique_ptr<Store>> OpenStore(const ServerOptions& options) {
   if (options.idle_timeout < absl::ZeroDuration()) {
     return InvalidArgument(reason::kBadArgument, "idle_timeout is negative", {{"field", "idle_timeout"}});
   }
+  if (options.retention.max_age < absl::ZeroDuration()) {
+    return InvalidArgument(reason::kBadArgument, "retain_age is negative", {{"field", "retain_age"}});
+  }
   DYNMESH_ASSIGN_OR_RETURN(std::unique_ptr<Engine> engine, OpenRocksDb({options.data_dir}));
   return LocalStore::Open(std::move(engine), {.async_delay = options.async_delay});
 }
@@ -169,7 +173,7 @@ class Server::Impl {
       : quick_(ExecutorOptions("quick", QuickThreads(options), options.limits)),
         heavy_(ExecutorOptions("heavy", HeavyThreads(options), options.limits)),
         registry_(options.limits, Workers{&quick_, &heavy_, &timer_}, std::move(store),
-                  {.checkpoint_bytes = options.checkpoint_bytes}),
+                  {.checkpoint_bytes = options.checkpoint_bytes, .retention = options.retention}),
         unload_policy_(PolicyOf(options)),
         sweep_period_(SweepPeriod(options)) {
     const ServiceContext context{registry_, streams_};
@@ -177,6 +181,7 @@ class Server::Impl {
     services_.push_back(MakeEditsService(context));
     services_.push_back(MakeQueriesService(context));
     services_.push_back(MakeRepairsService(context));
+    services_.push_back(MakeHistoryService(context));
     services_.push_back(MakeChecksService(context));
     services_.push_back(MakeSubscriptionsService(context));
     services_.push_back(MakeAdaptService(context));

@@ -8,6 +8,7 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 #include "absl/time/time.h"
+#include "server/session/durability/retention.h"
 #include "server/session/limits.h"
 #include "server/session/registry.h"
 
@@ -30,6 +31,8 @@ struct ServerOptions {
   absl::Duration idle_timeout = absl::Minutes(30);
   /// When those that are loaded hold more, the least recently used ones are unloaded; 0: however much.
   uint64_t max_loaded_bytes = 0;
+  /// Earlier revisions of sessions in data_dir that are kept; a session can say otherwise.
+  Retention retention = {kDefaultRetainedRevisions, absl::ZeroDuration(), kDefaultRetainedBytes};
   Limits limits;
   int quick_threads = 0;  ///< 0: four for each processor, at least 8
   int heavy_threads = 0;  ///< 0: four more than max_concurrent_imports

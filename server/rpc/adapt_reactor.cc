@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "core/mesh/error.h"
+#include "server/rpc/convert.h"
 #include "server/rpc/convert_adapt.h"
 #include "server/rpc/session_work.h"
 #include "server/rpc/status.h"
@@ -52,8 +53,8 @@ absl::Status AdaptReactor::Begin(const SessionPtr& session, AccessGrant) {
   DYNMESH_RETURN_IF_ERROR(stop_.Check());
   DYNMESH_RETURN_IF_ERROR(CheckMessageSize(request_, services_.limits()));
   DYNMESH_ASSIGN_OR_RETURN(const AdaptOptions options, ToAdaptOptions(request_, services_.limits()));
-  DYNMESH_ASSIGN_OR_RETURN(adaptation_,
-                           Adaptation::Start(session, services_.registry.adaptation_budget(), options));
+  DYNMESH_ASSIGN_OR_RETURN(adaptation_, Adaptation::Start(session, services_.registry.adaptation_budget(),
+                                                          options, ToNote(request_.note())));
   return absl::OkStatus();
 }
 

@@ -5,6 +5,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/mesh/error.h"
+#include "server/session/session_errors.h"
 
 namespace dynmesh {
 
@@ -80,6 +81,36 @@ v1::AttributeSpec FromAttributeSpec(const AttributeSpec& spec) {
   message.set_policy(static_cast<v1::AttributePolicy>(spec.effective_policy()));
   if (!spec.has_zero_default()) message.set_default_row(FromArray(spec.default_row));
   return message;
+}
+
+absl::StatusOr<int> ToPageSize(int requested) {
+  constexpr int kDefaultPageSize = 100;
+  constexpr int kMaxPageSize = 1000;
+  if (requested < 0) return BadField("page_size", "page_size is negative");
+  return requested == 0 ? kDefaultPageSize : std::min(requested, kMaxPageSize);
+}
+
+google::protobuf::Timestamp FromTime(absl::Time time) {
+  google::protobuf::Timestamp message;
+  const int64_t nanos = absl::ToUnixNanos(time);
+  message.set_seconds(nanos / 1'000'000'000);
+  message.set_nanos(nanos % 1'000'000'000);
+  return message;
+}
+
+RevisionNote ToNote(const v1::RevisionNote& message) { return {message.author(), message.message()}; }
+
+v1::RevisionNote FromNote(const RevisionNote& note) {
+  v1::RevisionNote message;
+  message.set_author(note.author);
+  message.set_message(note.message);
+  return message;
+}
+
+KindCounts ToKindCounts(const std::array<uint32_t, kNumEntityKinds>& live) {
+  KindCounts counts;
+  std::copy(live.begin(), live.end(), counts.begin());
+  return counts;
 }
 
 v1::Checksum FromChecksum(const Checksum& checksum) {

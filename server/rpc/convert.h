@@ -1,6 +1,7 @@
 #ifndef DYNMESH_SERVER_RPC_CONVERT_H_
 #define DYNMESH_SERVER_RPC_CONVERT_H_
 
+#include <array>
 #include <cstdint>
 #include <cstring>
 #include <string>
@@ -9,12 +10,15 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
+#include "absl/time/time.h"
 #include "absl/types/span.h"
 #include "core/mesh/attributes.h"
 #include "core/mesh/checksum.h"
 #include "core/mesh/element_type.h"
 #include "core/mesh/ids.h"
 #include "dynmesh/v1/types.pb.h"
+#include "google/protobuf/timestamp.pb.h"
+#include "server/session/durability/revision_note.h"
 #include "server/session/mesh_warnings.h"
 #include "server/session/session_info.h"
 
@@ -55,7 +59,14 @@ v1::ElementType FromElementType(ElementType type);
 absl::StatusOr<AttributeSpec> ToAttributeSpec(const v1::AttributeSpec& spec);
 v1::AttributeSpec FromAttributeSpec(const AttributeSpec& spec);
 
+/// So many items a page has. Errors: BAD_ARGUMENT for a negative number.
+absl::StatusOr<int> ToPageSize(int requested);
+
+google::protobuf::Timestamp FromTime(absl::Time time);
+RevisionNote ToNote(const v1::RevisionNote& message);
+v1::RevisionNote FromNote(const RevisionNote& note);
 v1::Checksum FromChecksum(const Checksum& checksum);
+KindCounts ToKindCounts(const std::array<uint32_t, kNumEntityKinds>& live);
 v1::EntityCounts FromCounts(const KindCounts& counts);
 v1::Warning FromWarning(const MeshWarning& warning);
 

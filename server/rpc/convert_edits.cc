@@ -217,12 +217,6 @@ void FromEditResult(const EditResult& result, v1::EditResult* message) {
   message->set_num_moved(result.num_moved);
 }
 
-KindCounts ToKindCounts(const std::array<uint32_t, kNumEntityKinds>& live) {
-  KindCounts counts;
-  std::copy(live.begin(), live.end(), counts.begin());
-  return counts;
-}
-
 absl::StatusOr<ConflictPolicy> ToConflictPolicy(v1::ConflictPolicy policy) {
   switch (policy) {
     case v1::CONFLICT_POLICY_UNSPECIFIED:
@@ -242,6 +236,7 @@ HistoryOptions HistoryOptionsOf(const Request& request) {
   if (request.has_if_revision()) options.if_revision = request.if_revision();
   options.request_id = request.request_id();
   options.validate_only = request.validate_only();
+  options.note = ToNote(request.note());
   return options;
 }
 
@@ -279,6 +274,7 @@ absl::StatusOr<ApplyOptions> ToApplyOptions(const v1::ApplyEditsRequest& request
   options.validate_only = request.validate_only();
   options.skip_refused = request.skip_refused();
   options.report_lineage = request.report_lineage();
+  options.note = ToNote(request.note());
   return options;
 }
 

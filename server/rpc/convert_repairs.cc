@@ -65,6 +65,7 @@ absl::StatusOr<RepairRequest> ToRepairRequest(const v1::RepairSessionRequest& re
   if (request.has_if_revision()) repair.if_revision = request.if_revision();
   repair.request_id = request.request_id();
   repair.validate_only = request.validate_only();
+  repair.note = ToNote(request.note());
   return repair;
 }
 

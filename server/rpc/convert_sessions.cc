@@ -16,16 +16,9 @@ namespace {
 
 // Says which version of a token it is, and keeps a bare name from being one.
 constexpr char kTokenPrefix = '1';
+constexpr int64_t kMaxRetentionSeconds = int64_t{1000} * 366 * 24 * 3600;
 // So much of a path that a peer made up is repeated to it.
 constexpr size_t kMaxShownPath = 64;
-
-google::protobuf::Timestamp FromTime(absl::Time time) {
-  google::protobuf::Timestamp message;
-  const int64_t nanos = absl::ToUnixNanos(time);
-  message.set_seconds(nanos / 1'000'000'000);
-  message.set_nanos(nanos % 1'000'000'000);
-  return message;
-}
 
 v1::Relation FromRelation(Relation relation) {
   v1::Relation message;
@@ -66,19 +59,25 @@ struct ExportVisitor {
   }
 };
 
-absl::StatusOr<SessionDurability> ToDurability(v1::Durability durability) {
-  switch (durability) {
-    case v1::DURABILITY_UNSPECIFIED:
-      return SessionDurability::kDefault;
-    case v1::DURABILITY_NONE:
-      return SessionDurability::kNone;
-    case v1::DURABILITY_ASYNC:
-      return SessionDurability::kAsync;
-    case v1::DURABILITY_SYNC:
-      return SessionDurability::kSync;
-    default:
-      return BadField("durability", "there is no such durability");
-  }
+absl::StatusOr<Retention> ToRetention(const v1::Retention& message) {
+  const google::protobuf::Duration& age = message.max_age();
+  const bool valid = age.seconds() >= 0 && age.nanos() >= 0 && age.nanos() < 1'000'000'000 &&
+                     age.seconds() <= kMaxRetentionSeconds;
+  if (!valid)
+    return BadField("retention.max_age", "retention.max_age is negative, or longer than 1000 years");
+  return Retention{message.max_revisions(), absl::Seconds(age.seconds()) + absl::Nanoseconds(age.nanos()),
+                   message.max_bytes()};
+}
+
+v1::Retention FromRetention(const Retention& retention) {
+  v1::Retention message;
+  message.set_max_revisions(retention.max_revisions);
+  message.set_max_bytes(retention.max_bytes);
+  if (retention.max_age == absl::ZeroDuration()) return message;
+  const int64_t nanos = absl::ToInt64Nanoseconds(retention.max_age % absl::Seconds(1));
+  message.mutable_max_age()->set_seconds(absl::ToInt64Seconds(retention.max_age));
+  message.mutable_max_age()->set_nanos(static_cast<int32_t>(nanos));
+  return message;
 }
 
 v1::Durability FromDurability(SessionDurability durability) {
@@ -128,6 +127,21 @@ absl::StatusOr<std::vector<Relation>> ToStoredRelations(const v1::SessionSetting
 
 }  // namespace
 
+absl::StatusOr<SessionDurability> ToDurability(v1::Durability durability) {
+  switch (durability) {
+    case v1::DURABILITY_UNSPECIFIED:
+      return SessionDurability::kDefault;
+    case v1::DURABILITY_NONE:
+      return SessionDurability::kNone;
+    case v1::DURABILITY_ASYNC:
+      return SessionDurability::kAsync;
+    case v1::DURABILITY_SYNC:
+      return SessionDurability::kSync;
+    default:
+      return BadField("durability", "there is no such durability");
+  }
+}
+
 absl::StatusOr<SessionSettings> ToSettings(const v1::SessionSettings& message) {
   SessionSettings settings;
   if (message.duplicate_policy() == v1::DUPLICATE_POLICY_REFUSE) {
@@ -139,6 +153,7 @@ absl::StatusOr<SessionSettings> ToSettings(const v1::SessionSettings& message) {
   DYNMESH_ASSIGN_OR_RETURN(settings.durability, ToDurability(message.durability()));
   DYNMESH_ASSIGN_OR_RETURN(settings.stored_relations, ToStoredRelations(message));
   DYNMESH_ASSIGN_OR_RETURN(settings.checks, ToLocalCheckSettings(message.checks()));
+  DYNMESH_ASSIGN_OR_RETURN(settings.retention, ToRetention(message.retention()));
   return settings;
 }
 
@@ -151,6 +166,8 @@ absl::StatusOr<SettingsUpdate> ToSettingsUpdate(const v1::UpdateSessionRequest& 
       DYNMESH_ASSIGN_OR_RETURN(update.stored_relations, ToStoredRelations(settings));
     } else if (path == "settings.checks") {
       DYNMESH_ASSIGN_OR_RETURN(update.checks, ToLocalCheckSettings(settings.checks()));
+    } else if (path == "settings.retention") {
+      DYNMESH_ASSIGN_OR_RETURN(update.retention, ToRetention(settings.retention()));
     } else {
       return BadField("update_mask", absl::StrCat("\"", absl::CHexEscape(path.substr(0, kMaxShownPath)),
                                                   "\" is not a field that can be changed"));
@@ -178,6 +195,7 @@ v1::Session FromSessionInfo(const SessionInfo& info) {
     *part->mutable_relation() = FromRelation(stored.relation);
     part->set_memory_bytes(stored.memory_bytes);
   }
+  *message.mutable_settings()->mutable_retention() = FromRetention(info.settings.retention);
   FromCheckSettings(info.settings.checks, message.mutable_settings()->mutable_checks());
   *message.mutable_create_time() = FromTime(info.create_time);
   *message.mutable_update_time() = FromTime(info.update_time);
@@ -212,8 +230,7 @@ absl::StatusOr<std::string> FromPageToken(const std::string& token) {
   if (decoded && !name.empty() && name[0] == kTokenPrefix && CheckSessionName(name.substr(1)).ok()) {
     return name.substr(1);
   }
-  return InvalidArgument(reason::kBadPageToken, "page_token is none that this server gave",
-                         {{"field", "page_token"}});
+  return BadPageToken();
 }
 
 absl::StatusOr<ImportOptions> ToImportOptions(const v1::ImportHeader& header) {
@@ -228,6 +245,7 @@ absl::StatusOr<ImportOptions> ToImportOptions(const v1::ImportHeader& header) {
   options.num_elements = header.num_elements();
   options.validate_only = header.validate_only();
   options.request_id = header.request_id();
+  options.note = ToNote(header.note());
   return options;
 }
 

@@ -25,10 +25,7 @@ class RepairReactor final : public grpc::ServerWriteReactor<v1::RepairSessionRes
  public:
   RepairReactor(const ServiceContext& services, const grpc::CallbackServerContext* context,
                 const v1::RepairSessionRequest& request)
-      : services_(services),
-        stop_(context),
-        request_(request),
-        lease_(services.registry.answer_budget()) {}
+      : services_(services), stop_(context), request_(request), lease_(services.registry.answer_budget()) {}
 
   RepairReactor* Start();
 

@@ -18,8 +18,6 @@
 namespace dynmesh {
 namespace {
 
-constexpr int kDefaultPageSize = 100;
-constexpr int kMaxPageSize = 1000;
 // A page ends early when its sessions, whose attribute lists may be long, hold this much.
 constexpr size_t kMaxPageBytes = size_t{1} << 20;
 constexpr uint64_t kManyEntities = 10'000'000;
@@ -76,8 +74,7 @@ class ListSessionsCall {
 
  private:
   absl::Status ChoosePage(const v1::ListSessionsRequest& request) {
-    if (request.page_size() < 0) return BadField("page_size", "page_size is negative");
-    page_size_ = request.page_size() == 0 ? kDefaultPageSize : std::min(request.page_size(), kMaxPageSize);
+    DYNMESH_ASSIGN_OR_RETURN(page_size_, ToPageSize(request.page_size()));
     DYNMESH_ASSIGN_OR_RETURN(const std::string after, FromPageToken(request.page_token()));
     sessions_ = call_.services.registry.ListAfter(after, page_size_ + 1);
     return absl::OkStatus();

@@ -88,7 +88,7 @@ class StreamEditsReactor final
   Mutex mu_;
   std::deque<Request> requests_ ABSL_GUARDED_BY(mu_);
   std::deque<Response> responses_ ABSL_GUARDED_BY(mu_);
-  size_t awaited_ ABSL_GUARDED_BY(mu_) = 0;  ///< acknowledgements that are still to come
+  size_t awaited_ ABSL_GUARDED_BY(mu_) = 0;        ///< acknowledgements that are still to come
   size_t request_bytes_ ABSL_GUARDED_BY(mu_) = 0;  ///< of requests_
   bool pumping_ ABSL_GUARDED_BY(mu_) = false;      ///< for ever, once the call is finished
   bool reading_ ABSL_GUARDED_BY(mu_) = false;

@@ -47,14 +47,14 @@ grpc::ServerUnaryReactor* RunUnary(const char* rpc, grpc::CallbackServerContext*
   return reactor;
 }
 
-/// How a call in turn ended.
-struct TurnEnd {
+/// How a call at a session ended.
+struct CallEnd {
   grpc::ServerUnaryReactor* reactor;  ///< to be finished
   SessionPtr session;
   absl::Status status;
 };
 
-/// Runs fn(session, grant) when it is its turn at the session of that name, then end(TurnEnd).
+/// Runs fn(session, grant) when it is its turn at the session of that name, then end(CallEnd).
 template <typename Fn, typename End>
 grpc::ServerUnaryReactor* RunInTurn(const UnaryCall& call, const std::string& session_name,
                                     const SessionWork& work, Fn fn, End end) {
@@ -67,7 +67,7 @@ grpc::ServerUnaryReactor* RunInTurn(const UnaryCall& call, const std::string& se
       const absl::Status status =
           stopped.ok() ? CatchExceptions([&] { return fn(session, std::move(grant)); }) : stopped;
       grant.Release();
-      end(TurnEnd{reactor, session, status});
+      end(CallEnd{reactor, session, status});
     };
     posted = PostWork(call.services, *session, work, std::move(task));
   }
@@ -75,31 +75,60 @@ grpc::ServerUnaryReactor* RunInTurn(const UnaryCall& call, const std::string& se
   return reactor;
 }
 
+/// Runs fn(session) on a heavy thread, whose turn at the session of that name it is not, then end(CallEnd).
+/// For what waits for the disk.
+template <typename Fn, typename End>
+grpc::ServerUnaryReactor* RunOutOfTurn(const UnaryCall& call, const std::string& session_name, Fn fn,
+                                       End end) {
+  grpc::ServerUnaryReactor* reactor = call.context->DefaultReactor();
+  const absl::StatusOr<SessionPtr> session = call.services.registry.Find(session_name);
+  absl::Status posted = session.status();
+  if (session.ok()) {
+    posted = call.services.heavy().TryPost([call, reactor, session = *session, fn = std::move(fn), end] {
+      const absl::Status stopped = CallStop(call.context).Check();
+      end(CallEnd{reactor, session, stopped.ok() ? CatchExceptions([&] { return fn(session); }) : stopped});
+    });
+  }
+  if (!posted.ok()) reactor->Finish(LoggedStatus(call.rpc, posted));
+  return reactor;
+}
+
+/// Answers a call at once.
+struct AnswerNow {
+  const char* rpc;
+
+  void operator()(const CallEnd& ended) const { ended.reactor->Finish(LoggedStatus(rpc, ended.status)); }
+};
+
+/// Answers a call that edits when what it did may be acknowledged. REQUIRES: `response` has the revision that
+/// was made and a durable_revision.
+template <typename Response>
+struct AnswerAcknowledged {
+  const char* rpc;
+  Response* response;
+
+  void operator()(const CallEnd& ended) const {
+    if (!ended.status.ok()) return ended.reactor->Finish(LoggedStatus(rpc, ended.status));
+    ended.session->AwaitAcknowledged(
+        response->revision(), [rpc = rpc, response = response, ended](const absl::Status& acknowledged) {
+          response->set_durable_revision(ended.session->durable_revision());
+          ended.reactor->Finish(LoggedStatus(rpc, acknowledged));
+        });
+  }
+};
+
 /// Answers a unary call by fn(session, grant), run when it is its turn at the session of that name.
 template <typename Fn>
 grpc::ServerUnaryReactor* RunOnSession(const UnaryCall& call, const std::string& session_name,
                                        const SessionWork& work, Fn fn) {
-  const auto end = [rpc = call.rpc](const TurnEnd& ended) {
-    ended.reactor->Finish(LoggedStatus(rpc, ended.status));
-  };
-  return RunInTurn(call, session_name, work, std::move(fn), end);
+  return RunInTurn(call, session_name, work, std::move(fn), AnswerNow{call.rpc});
 }
 
-/// The same for a call that edits: it is answered when what it did may be acknowledged. REQUIRES:
-/// `response` has the revision that was made and a durable_revision.
+/// The same for a call that edits.
 template <typename Response, typename Fn>
 grpc::ServerUnaryReactor* RunEdit(const UnaryCall& call, const std::string& session_name,
                                   const SessionWork& work, Response* response, Fn fn) {
-  const auto end = [rpc = call.rpc, response](const TurnEnd& ended) {
-    if (!ended.status.ok()) return ended.reactor->Finish(LoggedStatus(rpc, ended.status));
-    const SessionPtr& session = ended.session;
-    session->AwaitAcknowledged(response->revision(),
-                               [rpc, response, ended](const absl::Status& acknowledged) {
-                                 response->set_durable_revision(ended.session->durable_revision());
-                                 ended.reactor->Finish(LoggedStatus(rpc, acknowledged));
-                               });
-  };
-  return RunInTurn(call, session_name, work, std::move(fn), end);
+  return RunInTurn(call, session_name, work, std::move(fn), AnswerAcknowledged<Response>{call.rpc, response});
 }
 
 }  // namespace dynmesh

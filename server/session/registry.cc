@@ -101,6 +101,13 @@ absl::StatusOr<SessionInfo> SessionRegistry::CreateOnce(SessionSeed& seed) {
   return info;
 }
 
+absl::StatusOr<std::shared_ptr<const SessionInfo>> SessionRegistry::FindCreated(const std::string& request_id,
+                                                                                uint64_t fingerprint) {
+  if (request_id.empty()) return std::shared_ptr<const SessionInfo>();
+  MutexLock lock(&create_mu_);
+  return created_.Find(request_id, fingerprint);
+}
+
 absl::Status SessionRegistry::CheckCreation(const std::string& name) const {
   MutexLock lock(&mu_);
   if (draining_) return ShuttingDown();

@@ -89,6 +89,12 @@ class SessionRegistry {
   /// max_session_bytes) when the mesh is more than a session may hold here. Cost: storing all pages.
   absl::StatusOr<SessionInfo> CreateFrom(SessionSeed seed);
 
+  /// What a request that created a session got, nullptr if there was none. Errors: INVALID_ARGUMENT
+  /// REQUEST_ID_REUSED. May wait for a creation.
+  absl::StatusOr<std::shared_ptr<const SessionInfo>> FindCreated(const std::string& request_id,
+                                                                 uint64_t fingerprint)
+      ABSL_LOCKS_EXCLUDED(create_mu_);
+
   /// OK, or why no session of that name can be made now: errors of Create but for those of the store.
   absl::Status CheckCreation(const std::string& name) const ABSL_LOCKS_EXCLUDED(mu_);
 

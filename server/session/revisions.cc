@@ -77,6 +77,15 @@ absl::StatusOr<RecoveredRevision> MeshAt(Session& session, int64_t revision) {
   return RecoverRevision(log->store(), *source, session.limits());
 }
 
+absl::StatusOr<std::shared_ptr<const HistoryResult>> GoBackTo(Session& session, int64_t revision,
+                                                              const HistoryOptions& options,
+                                                              const StopSignal& stop) {
+  DYNMESH_ASSIGN_OR_RETURN(const RecoveredRevision then, MeshAt(session, revision));
+  DYNMESH_RETURN_IF_ERROR(stop.Check());
+  const AccessGrant turn = session.access().Acquire(AccessMode::kWrite);
+  return session.RestoreTo(then.mesh, options, stop);
+}
+
 absl::StatusOr<int64_t> FindSnapshotRevision(Session& session, absl::string_view name) {
   DYNMESH_ASSIGN_OR_RETURN(SessionLog* const log, LogOf(session));
   DYNMESH_ASSIGN_OR_RETURN(const Snapshot snapshot, log->FindSnapshot(name));

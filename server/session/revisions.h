@@ -50,6 +50,12 @@ absl::StatusOr<RevisionList> ListRevisions(Session& session, int64_t before, siz
 /// copy.
 absl::StatusOr<RecoveredRevision> MeshAt(Session& session, int64_t revision);
 
+/// Puts the session back to what it was at `revision`: Session::RestoreTo() when it is its turn. Only that
+/// keeps others waiting. Errors: those of both.
+absl::StatusOr<std::shared_ptr<const HistoryResult>> GoBackTo(Session& session, int64_t revision,
+                                                              const HistoryOptions& options,
+                                                              const StopSignal& stop);
+
 /// The revision that a snapshot keeps. Errors: NOT_FOUND SNAPSHOT_NOT_FOUND; NO_HISTORY.
 absl::StatusOr<int64_t> FindSnapshotRevision(Session& session, absl::string_view name);
 

@@ -176,6 +176,15 @@ absl::StatusOr<SessionInfo> Session::Info() const {
   });
 }
 
+SessionSettings Session::Settings() const {
+  SessionSettings settings = options_.settings;
+  settings.checks = checks();
+  settings.retention = retention();
+  ReaderMutexLock lock(&mu_);
+  settings.stored_relations = StoredRelationsOf(mesh_);
+  return settings;
+}
+
 SessionInfo Session::Describe(const Mesh& mesh, const MeshSummary& summary, absl::Time update_time) const {
   SessionInfo info = DescribeMesh(mesh, summary);
   info.name = name();

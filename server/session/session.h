@@ -216,6 +216,9 @@ class Session : public std::enable_shared_from_this<Session> {
 
   absl::StatusOr<SessionInfo> Info() const ABSL_LOCKS_EXCLUDED(mu_);
 
+  /// As they are now. Takes the reader lock for a moment.
+  SessionSettings Settings() const ABSL_LOCKS_EXCLUDED(mu_, settings_mu_);
+
   /// Whether Info() can be had. Never waits.
   SessionState state() const { return state_.load(); }
   /// What is known of a session that is not loaded. Takes the reader lock for a moment.

@@ -208,18 +208,13 @@ absl::Status Session::StoreImport(const Mesh& mesh, const LoggedRequest& request
 
 absl::Status Session::StoreIdentity() {
   MutexLock lock(&identity_mu_);
-  SessionIdentity identity{uid_,
-                           create_time_,
-                           options_.settings,
-                           options_.create_request_id,
-                           options_.create_fingerprint,
-                           options_.create_revision};
-  identity.settings.checks = checks();
-  identity.settings.retention = retention();
-  DYNMESH_RETURN_IF_ERROR(Read([&](const SessionView& view) {
-    identity.settings.stored_relations = StoredRelationsOf(view.mesh);
-    return absl::OkStatus();
-  }));
+  DYNMESH_RETURN_IF_ERROR(Read([](const SessionView&) { return absl::OkStatus(); }));
+  const SessionIdentity identity{uid_,
+                                 create_time_,
+                                 Settings(),
+                                 options_.create_request_id,
+                                 options_.create_fingerprint,
+                                 options_.create_revision};
   return log_->store().PutValue(kIdentityName, EncodeIdentity(identity));
 }
 

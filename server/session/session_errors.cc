@@ -130,6 +130,11 @@ absl::Status EtagMismatch(absl::string_view name, absl::string_view etag) {
                    {{"session", std::string(name)}, {"etag", std::string(etag)}});
 }
 
+absl::Status BadPageToken() {
+  return InvalidArgument(reason::kBadPageToken, "page_token is none that this server gave",
+                         {{"field", "page_token"}});
+}
+
 absl::Status BadField(absl::string_view field, absl::string_view message) {
   return InvalidArgument(reason::kBadArgument, message, {{"field", std::string(field)}});
 }

@@ -77,6 +77,9 @@ absl::Status SessionNotEmpty(absl::string_view name, int64_t revision);
 /// ABORTED ETAG_MISMATCH, metadata etag: the present one.
 absl::Status EtagMismatch(absl::string_view name, absl::string_view etag);
 
+/// INVALID_ARGUMENT BAD_PAGE_TOKEN.
+absl::Status BadPageToken();
+
 /// INVALID_ARGUMENT BAD_ARGUMENT, metadata field.
 absl::Status BadField(absl::string_view field, absl::string_view message);
 

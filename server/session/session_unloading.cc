@@ -34,12 +34,10 @@ void Session::MeasureMemory() {
 std::shared_ptr<Session> Session::Unload() {
   Options options = options_;
   options.uid = uid_;
-  options.settings.checks = checks();
-  options.settings.retention = retention();
+  options.settings = Settings();
   options.num_updates = num_updates_;
   std::map<int, QuantizationGrid> grids = deltas_.grids();
   WriterMutexLock lock(&mu_);
-  options.settings.stored_relations = StoredRelationsOf(mesh_);
   options.update_time = commit_time_;
   AnswerMemory<ImportOutcome> imports = CopyImports();
   auto stored = std::make_shared<Session>(options, log_, Content::kStored);

@@ -36,10 +36,10 @@ struct SessionIdentity {
 
 inline constexpr char kIdentityName[] = "identity";
 
-/// Format (varint, 1), uid, creation (int64, us since 1970), request id, fingerprint (u64), revision at which it
-/// began (varint), durability (u8), duplicates (u8), stored relations (their places in kStorableRelations), checks
-/// that are not as usual (name, severity, threshold), retention (revisions u32, age in us i64, bytes u64); texts
-/// and lists begin with their length (varint).
+/// Format (varint, 1), uid, creation (int64, us since 1970), request id, fingerprint (u64), revision at which
+/// it began (varint), durability (u8), duplicates (u8), stored relations (their places in
+/// kStorableRelations), checks that are not as usual (name, severity, threshold), retention (revisions u32,
+/// age in us i64, bytes u64); texts and lists begin with their length (varint).
 std::string EncodeIdentity(const SessionIdentity& identity);
 /// Errors: as DecodeManifest.
 absl::StatusOr<SessionIdentity> DecodeIdentity(absl::string_view bytes);

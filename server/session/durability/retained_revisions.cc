@@ -98,8 +98,8 @@ bool RetainedRevisions::IsNeeded(const StoredCheckpoint& checkpoint) const {
 int64_t RetainedRevisions::OldestWanted(absl::Time now) const {
   const uint32_t max_records = OrMax(retention_.max_revisions);
   const uint64_t max_bytes = OrMax(retention_.max_bytes);
-  const absl::Time since = retention_.max_age == absl::ZeroDuration() ? absl::InfinitePast()
-                                                                      : now - retention_.max_age;
+  const absl::Time since =
+      retention_.max_age == absl::ZeroDuration() ? absl::InfinitePast() : now - retention_.max_age;
   int64_t oldest = last();
   uint64_t bytes = 0;
   uint32_t count = 0;
@@ -172,7 +172,8 @@ std::vector<uint64_t> RetainedRevisions::DropCheckpoints(size_t base) {
 std::vector<RecordRange> RetainedRevisions::KeptRecords() const {
   std::vector<RecordRange> kept;
   for (const Snapshot& snapshot : snapshots_) {
-    if (snapshot.checkpoint_revision < trimmed_) kept.push_back({snapshot.checkpoint_revision, snapshot.revision});
+    if (snapshot.checkpoint_revision < trimmed_)
+      kept.push_back({snapshot.checkpoint_revision, snapshot.revision});
   }
   for (const RevisionSource& pin : pins_) kept.push_back(pin.records);
   return kept;

@@ -23,8 +23,8 @@ struct StoredRecord {
   absl::Time commit_time;
 };
 
-/// A checkpoint that the store holds. With the records after `revision` it gives any revision from `newest` on:
-/// some of its pages may be as late as that.
+/// A checkpoint that the store holds. With the records after `revision` it gives any revision from `newest`
+/// on: some of its pages may be as late as that.
 struct StoredCheckpoint {
   uint64_t number = 0;
   int64_t revision = 0;
@@ -74,7 +74,8 @@ class RetainedRevisions {
     int64_t records = 0;            ///< up to this revision; 0: none
     std::vector<RecordRange> kept;  ///< but for these
   };
-  /// So many of the last records stay in any case, and so many bytes of them: for the answers that retries get.
+  /// So many of the last records stay in any case, and so many bytes of them: for the answers that retries
+  /// get.
   struct AnswersToKeep {
     size_t records = 0;
     uint64_t bytes = 0;

@@ -8,8 +8,8 @@
 namespace dynmesh {
 
 /// How many of a session's last revisions can be had again. Those that any of the limits lets go are deleted
-/// when checkpoints are made, not at once. A field of 0 sets no limit, or that of the daemon in the settings of
-/// a session.
+/// when checkpoints are made, not at once. A field of 0 sets no limit, or that of the daemon in the settings
+/// of a session.
 struct Retention {
   uint32_t max_revisions = 0;
   absl::Duration max_age = absl::ZeroDuration();

@@ -9,8 +9,8 @@ absl::Status CheckNote(const RevisionNote& note) {
   if (note.author.size() > kMaxAuthorBytes) {
     return BadField("note.author", absl::StrCat("an author has at most ", kMaxAuthorBytes, " bytes"));
   }
-  if (note.message.size() > kMaxMessageBytes) {
-    return BadField("note.message", absl::StrCat("a message has at most ", kMaxMessageBytes, " bytes"));
+  if (note.message.size() > kMaxNoteBytes) {
+    return BadField("note.message", absl::StrCat("a message has at most ", kMaxNoteBytes, " bytes"));
   }
   return absl::OkStatus();
 }

@@ -17,7 +17,7 @@ struct RevisionNote {
 };
 
 inline constexpr size_t kMaxAuthorBytes = 256;
-inline constexpr size_t kMaxMessageBytes = 4096;
+inline constexpr size_t kMaxNoteBytes = 4096;
 
 /// INVALID_ARGUMENT BAD_ARGUMENT, metadata field, when a text is too long.
 absl::Status CheckNote(const RevisionNote& note);
