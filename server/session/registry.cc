@@ -46,7 +46,7 @@ SessionIdentity IdentityOf(const Session::Options& options) {
 
 absl::StatusOr<SessionInfo> SessionRegistry::Create(const std::string& name, const SessionSettings& settings,
                                                     const std::string& request_id) {
-  const absl::Time now = absl::Now();
+  const absl::Time now = NowToTheMicrosecond();
   return CreateFrom({.name = name,
                      .settings = settings,
                      .mesh = Mesh(MeshOptions{settings.duplicates, ToMeshLimits(limits_)}),

@@ -22,6 +22,7 @@
 #include "server/session/limits.h"
 #include "server/session/mutex.h"
 #include "server/session/session.h"
+#include "server/session/wall_clock.h"
 #include "server/session/workers.h"
 #include "server/store/store.h"
 
@@ -38,8 +39,8 @@ struct SessionSeed {
   std::string name;
   SessionSettings settings = {};         ///< but `duplicates`, which is the mesh's
   Mesh mesh;                             ///< of any revision, whatever relations it stores; no batch is open
-  absl::Time commit_time = absl::Now();  ///< of mesh.revision()
-  absl::Time create_time = absl::Now();
+  absl::Time commit_time = NowToTheMicrosecond();  ///< of mesh.revision()
+  absl::Time create_time = NowToTheMicrosecond();
   RevisionNote note = {};
   // For retries: the fingerprint is of all that tells the request from others, the name too.
   std::string request_id = {};

@@ -101,7 +101,7 @@ absl::StatusOr<Snapshot> CreateSnapshot(Session& session, absl::string_view name
   Snapshot snapshot;
   snapshot.name = std::string(name);
   snapshot.revision = revision == 0 ? session.revision() : revision;
-  snapshot.create_time = absl::Now();
+  snapshot.create_time = NowToTheMicrosecond();
   snapshot.note = note;
   // What is not on disk yet could be taken back by a crash, and the snapshot not.
   DYNMESH_RETURN_IF_ERROR(session.WaitUntilDurable(std::min(snapshot.revision, session.revision())));

@@ -397,7 +397,7 @@ Session::AnswerPtr Session::Unchanged() const {
 }
 
 void Session::Committed() {
-  commit_time_ = absl::Now();
+  commit_time_ = NowToTheMicrosecond();
   revision_.store(mesh_.revision());
   for (EntityKind kind : kEntityKinds) num_live_[Dimension(kind)].store(mesh_.NumLive(kind));
   history_.Follow(mesh_.revision());

@@ -33,6 +33,7 @@
 #include "server/session/session_info.h"
 #include "server/session/shared_spatial_index.h"
 #include "server/session/stop_signal.h"
+#include "server/session/wall_clock.h"
 #include "server/session/workers.h"
 
 namespace dynmesh {
@@ -112,7 +113,7 @@ class Session : public std::enable_shared_from_this<Session> {
     Limits limits;
     Workers workers;
     std::string uid = {};  ///< empty: a new one
-    absl::Time create_time = absl::Now();
+    absl::Time create_time = NowToTheMicrosecond();
     // Of the request that created it, which its log's store remembers.
     std::string create_request_id = {};
     uint64_t create_fingerprint = 0;

@@ -199,7 +199,8 @@ absl::Status Session::StoreImport(const Mesh& mesh, const LoggedRequest& request
     DYNMESH_RETURN_IF_ERROR(CheckEmpty());
     stores_import_ = true;
   }
-  const absl::Status stored = CatchExceptions([&] { return log_->StoreAll(mesh, absl::Now(), request); });
+  const absl::Status stored =
+      CatchExceptions([&] { return log_->StoreAll(mesh, NowToTheMicrosecond(), request); });
   if (stored.ok()) return stored;
   WriterMutexLock lock(&mu_);
   stores_import_ = false;

@@ -109,7 +109,8 @@ TEST(AnswerCodecTest, DamagedAnswersDoNoHarm) {
 }
 
 TEST(LogRecordTest, ARecordIsTheSameAgainAndADamagedOneDoesNoHarm) {
-  const LogRecord record{absl::FromUnixMicros(123456789), {LoggedCall::kRepair, "id", 99, "answer"}, "batch"};
+  const LogRecord record{
+      absl::FromUnixMicros(123456789), {LoggedCall::kRepair, "id", 99, "answer", {"ann", "why"}}, "batch"};
   const std::string bytes = EncodeLogRecord(record);
   const auto decoded = DecodeLogRecord(bytes);
   ASSERT_TRUE(decoded.ok()) << decoded.status();
@@ -118,6 +119,7 @@ TEST(LogRecordTest, ARecordIsTheSameAgainAndADamagedOneDoesNoHarm) {
   EXPECT_EQ(decoded->request.request_id, "id");
   EXPECT_EQ(decoded->request.fingerprint, 99u);
   EXPECT_EQ(decoded->request.answer, "answer");
+  EXPECT_EQ(decoded->request.note, (RevisionNote{"ann", "why"}));
   EXPECT_EQ(decoded->batch, "batch");
   for (size_t length = 0; length + record.batch.size() < bytes.size(); ++length) {
     EXPECT_FALSE(DecodeLogRecord(absl::string_view(bytes).substr(0, length)).ok()) << length;
@@ -127,12 +129,58 @@ TEST(LogRecordTest, ARecordIsTheSameAgainAndADamagedOneDoesNoHarm) {
   EXPECT_EQ(DecodeLogRecord(newer).status().code(), absl::StatusCode::kFailedPrecondition);
 }
 
+TEST(LogRecordTest, AnOriginIsTheSameAgainAndADamagedOneDoesNoHarm) {
+  const Origin origin{
+      7, 99, absl::FromUnixMicros(5), {LoggedCall::kImport, "id", 3, "answer", {"ann", "why"}}};
+  const std::string bytes = EncodeOrigin(origin);
+  const auto decoded = DecodeOrigin(bytes);
+  ASSERT_TRUE(decoded.ok()) << decoded.status();
+  EXPECT_EQ(EncodeOrigin(*decoded), bytes);
+  EXPECT_EQ(decoded->revision, 7);
+  EXPECT_EQ(decoded->bytes, 99u);
+  EXPECT_EQ(decoded->request.answer, "answer");
+  ExpectHarmlessWhenDamaged(bytes, [](absl::string_view b) { return DecodeOrigin(b).ok(); });
+  EXPECT_FALSE(DecodeOrigin(bytes + "x").ok());
+}
+
+ImportOutcome FullImport() {
+  ImportOutcome outcome;
+  outcome.revision = outcome.info.revision = 1;
+  outcome.info.name = "mesh";
+  outcome.info.uid = "0123456789abcdef";
+  outcome.info.etag = "etag";
+  outcome.info.create_time = absl::FromUnixMicros(5);
+  outcome.info.update_time = absl::FromUnixMicros(6);
+  outcome.info.settings.durability = SessionDurability::kSync;
+  outcome.info.settings.stored_relations = {kStorableRelations[1]};
+  outcome.info.stored_relations = {{kStorableRelations[1], 1234}};
+  outcome.info.counts = {1, 2, 3, 4};
+  outcome.info.euler_characteristic = -2;
+  outcome.info.attributes = {{.name = "heat", .kind = EntityKind::kCell, .components = 3}};
+  outcome.info.bounds = Box{{0, 0, 0}, {1, 2, 3}};
+  outcome.warnings = {{WarningKind::kDuplicateElement, EntityKind::kFace, {4, 5}, 9}};
+  return outcome;
+}
+
+TEST(AnswerCodecTest, AnImportIsAnsweredTheSameAgainAndADamagedAnswerDoesNoHarm) {
+  const std::string bytes = EncodeAnswer(FullImport());
+  const auto decoded = DecodeImportOutcome(bytes);
+  ASSERT_TRUE(decoded.ok()) << decoded.status();
+  EXPECT_EQ(EncodeAnswer(*decoded), bytes);
+  EXPECT_EQ(decoded->info.stored_relations[0].memory_bytes, 1234u);
+  EXPECT_EQ(decoded->info.bounds->high[2], 3);
+  EXPECT_EQ(decoded->warnings[0].ids, (std::vector<Slot>{4, 5}));
+  ExpectHarmlessWhenDamaged(bytes, [](absl::string_view b) { return DecodeImportOutcome(b).ok(); });
+}
+
 TEST(ManifestTest, AnIdentityIsTheSameAgainAndADamagedOneDoesNoHarm) {
   SessionIdentity identity{"0123456789abcdef", absl::FromUnixMicros(5), {}, "create", 77};
   identity.settings.durability = SessionDurability::kAsync;
   identity.settings.duplicates = DuplicatePolicy::kRefuse;
   identity.settings.stored_relations = {kStorableRelations[2], kStorableRelations[0]};
   ASSERT_TRUE(identity.settings.checks.Set(CheckKind::kMinDihedral, {Severity::kReject, 0.25}).ok());
+  identity.settings.retention = {7, absl::Microseconds(1500), 1 << 20};
+  identity.create_revision = 300;
   const std::string bytes = EncodeIdentity(identity);
   const auto decoded = DecodeIdentity(bytes);
   ASSERT_TRUE(decoded.ok()) << decoded.status();
@@ -141,27 +189,17 @@ TEST(ManifestTest, AnIdentityIsTheSameAgainAndADamagedOneDoesNoHarm) {
   EXPECT_EQ(decoded->request_id, "create");
   EXPECT_TRUE(decoded->settings.checks == identity.settings.checks);
   EXPECT_EQ(decoded->settings.stored_relations, identity.settings.stored_relations);
-  ExpectHarmlessWhenDamaged(bytes, [](absl::string_view b) { return DecodeIdentity(b).ok(); });
-}
-
-TEST(ManifestTest, AnIdentityIsOfTheOldestFormatThatSaysIt) {
-  SessionIdentity identity{"0123456789abcdef", absl::FromUnixMicros(5), {}};
-  identity.settings.durability = SessionDurability::kSync;
-  EXPECT_EQ(EncodeIdentity(identity)[0], 1);
-  identity.create_revision = 300;
-  const std::string bytes = EncodeIdentity(identity);
-  EXPECT_EQ(bytes[0], 2);
-  const auto decoded = DecodeIdentity(bytes);
-  ASSERT_TRUE(decoded.ok()) << decoded.status();
+  EXPECT_EQ(decoded->settings.retention, identity.settings.retention);
   EXPECT_EQ(decoded->create_revision, 300);
   ExpectHarmlessWhenDamaged(bytes, [](absl::string_view b) { return DecodeIdentity(b).ok(); });
 }
 
 TEST(ManifestTest, AManifestIsTheSameAgain) {
-  const auto decoded = DecodeManifest(EncodeManifest({absl::FromUnixMicros(9), "head"}));
+  const auto decoded = DecodeManifest(EncodeManifest({absl::FromUnixMicros(9), "head", 12}));
   ASSERT_TRUE(decoded.ok()) << decoded.status();
   EXPECT_EQ(decoded->commit_time, absl::FromUnixMicros(9));
   EXPECT_EQ(decoded->head, "head");
+  EXPECT_EQ(decoded->newest, 12);
   EXPECT_FALSE(DecodeManifest("").ok());
 }
 

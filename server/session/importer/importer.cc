@@ -127,7 +127,7 @@ absl::StatusOr<ImportAnswer> Importer::BuildAndAdopt(ImportMonitor& monitor, uin
   auto outcome = std::make_shared<ImportOutcome>();
   outcome->warnings = builder.warnings();
   // Described before others can edit it: the answer speaks of the import alone.
-  outcome->info = session_->Describe(mesh, SummaryCache().Of(mesh), absl::Now());
+  outcome->info = session_->Describe(mesh, SummaryCache().Of(mesh), NowToTheMicrosecond());
   if (options_.validate_only) {
     outcome->info.revision = 0;
     outcome->info.etag.clear();
