@@ -10,7 +10,7 @@ namespace dynmesh {
 /// Puts a mesh back to what it was at an earlier revision, as a new revision: `target` is the mesh as it was
 /// then, a Clone() or what an archive gives back (core/archive).
 ///
-///     const Mesh then = *RebuildAt(archive, 17);
+///     const Mesh then = *std::move(rebuilder).Finish();    // of what an archive held at revision 17
 ///     const RestoredBatches restored = *RestoreRevision(mesh, then, {.keeper = &log});
 ///     undo.Push(restored.images[0]);                       // to RestoreBatches(), as that of any batch
 ///

@@ -41,6 +41,7 @@ struct JournalEntry {
 /// What the arrays hold at a slot: the entity that was there last. Of a vertex its position is on the stack
 /// of positions.
 struct SlotContent {
+  ElementType type = ElementType::kUnspecified;
   uint8_t flags = 0;
   std::array<VertexId, kMaxElementVertices> vertices;
   std::array<uint32_t, kMaxElementFaces> parts;  ///< of a face its edges, of a cell its oriented faces

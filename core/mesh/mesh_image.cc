@@ -238,7 +238,7 @@ class BatchImageBuilder {
 
   static EntityContent Unpack(const SlotContent& saved, EntityKind kind) {
     EntityContent content;
-    content.type = static_cast<ElementType>(saved.flags & Mesh::kTypeMask);
+    content.type = saved.type;
     if (saved.flags & Mesh::kElementFlag) content.state |= BatchImage::kElement;
     if (saved.flags & Mesh::kDuplicateFlag) content.state |= BatchImage::kDuplicate;
     content.vertices = saved.vertices;

@@ -57,6 +57,7 @@ void Mesh::RetakeSlot(EntityId id, JournalEntry& entry) {
 void Mesh::SaveContent(EntityId id) {
   if (id.kind == EntityKind::kVertex) return journal_.positions.push_back(Position(VertexId(id.slot)));
   SlotContent& content = journal_.contents.emplace_back();
+  content.type = Type(id);
   content.flags = flags(id);
   const auto vertices = VerticesOf(id);
   std::copy(vertices.begin(), vertices.end(), content.vertices.begin());

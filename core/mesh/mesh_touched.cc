@@ -1,5 +1,5 @@
-// What the open batch has touched, read from its journal. A slot that was freed in the batch has had no other
-// occupant since, so the arrays still tell what stood there.
+// What the open batch has touched, read from its journal. Arrays still tell what stood at a slot that was
+// freed, or the journal does where another entity was put there.
 
 #include <algorithm>
 
@@ -40,8 +40,11 @@ class TouchedGatherer {
   TouchedGatherer(const Mesh& mesh, WorkMeter& meter) : mesh_(mesh), meter_(meter) {}
 
   absl::Status Gather(const Journal& journal) {
+    auto replaced = journal.contents.begin();
     for (const JournalEntry& entry : journal.entries) {
       DYNMESH_RETURN_IF_ERROR(meter_.ChargeSteps(1));
+      const bool replaces = entry.op == JournalOp::kRecycle && entry.kind != EntityKind::kVertex;
+      if (replaces) AddPartsOf(entry.kind, *replaced++);
       DYNMESH_RETURN_IF_ERROR(Gather(entry));
     }
     return AddStars(std::move(moved_).Take(mesh_.slots(EntityKind::kVertex)));
@@ -63,7 +66,7 @@ class TouchedGatherer {
         return absl::OkStatus();
       case JournalOp::kAddAttribute:
       case JournalOp::kSetAttribute:
-      case JournalOp::kRecycle:  // of what is restored; the new occupant is created next
+      case JournalOp::kRecycle:  // the new occupant is created next
         return absl::OkStatus();
       case JournalOp::kCreate:
       case JournalOp::kDestroy:
@@ -93,6 +96,24 @@ class TouchedGatherer {
       for (EdgeId e : mesh_.Edges(oriented.face())) Add(e);
     }
     return absl::OkStatus();
+  }
+
+  /// Of a face that ended too, the edges are told by its own entry.
+  void AddPartsOf(EntityKind kind, const SlotContent& ended) {
+    for (int k = 0; k < NumVertices(ended.type); ++k) Add(ended.vertices[k]);
+    if (kind == EntityKind::kFace) {
+      for (int k = 0; k < NumVertices(ended.type); ++k) Add(EdgeId(ended.parts[k]));
+    } else if (kind == EntityKind::kCell) {
+      AddFaces(absl::MakeConstSpan(ended.parts.data(), TemplateOf(ended.type).num_faces));
+    }
+  }
+
+  void AddFaces(absl::Span<const uint32_t> packed) {
+    for (uint32_t face : packed) {
+      const FaceId f = OrientedFace::FromPacked(face).face();
+      Add(f);
+      for (EdgeId e : mesh_.Edges(f)) Add(e);
+    }
   }
 
   absl::Status AddStars(absl::Span<const Slot> vertices) {

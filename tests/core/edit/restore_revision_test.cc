@@ -192,6 +192,28 @@ TEST(RestoreRevisionTest, OneImageTakesBackManyRestored) {
   EXPECT_EQ(FirstDifference(DescribeContent(mesh, 0), last), "");
 }
 
+TEST(RestoreRevisionTest, TouchesWhatWhoIsReplacedWasMadeOf) {
+  Mesh mesh = OneTet();
+  AddVertices(mesh, 4);
+  Commit(mesh);
+  const Mesh then = mesh.Clone();
+  ASSERT_TRUE(mesh.RemoveElement(CellId(0)).ok());
+  Commit(mesh);
+  Add(mesh, ElementType::kTetrahedron, {4, 5, 6, 7});
+  Commit(mesh);
+  ASSERT_EQ(mesh.slots(EntityKind::kEdge).limit(), 6u) << "every slot has had two";
+  const auto image = ImageOfRevision(mesh, then, WorkMeter::Unlimited());
+  ASSERT_TRUE(image.ok()) << image.status();
+  mesh.BeginBatch();
+  ASSERT_TRUE(mesh.Restore(*image).ok());
+  const auto touched = mesh.Touched(WorkMeter::Unlimited());
+  ASSERT_TRUE(touched.ok()) << touched.status();
+  EXPECT_THAT((*touched)[0], ElementsAre(0, 1, 2, 3, 4, 5, 6, 7));
+  EXPECT_THAT((*touched)[1], ElementsAre(0, 1, 2, 3, 4, 5));
+  EXPECT_THAT((*touched)[3], ElementsAre(0));
+  mesh.Rollback();
+}
+
 // ---- Options ----
 
 /// A mesh at revision 3, of which not much is as it was.
