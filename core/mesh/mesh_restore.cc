@@ -84,8 +84,8 @@ class BatchRestorer {
     }
     PutBackVertices();
     for (EntityKind kind : {EntityKind::kEdge, EntityKind::kFace, EntityKind::kCell}) {
-      DYNMESH_RETURN_IF_ERROR(ForEachEntity(kind, image_.ended[Dimension(kind)],
-                                            [this](const EntityView& view) { return PutBack(view); }));
+      DYNMESH_RETURN_IF_ERROR(PutBackThose(kind, 0));
+      DYNMESH_RETURN_IF_ERROR(PutBackThose(kind, BatchImage::kDuplicate));
     }
     mesh_.SettleBoundaries(image_.ended[3].slots);
     for (const BatchImage::Rows& rows : image_.rows) PutBackRows(rows);
@@ -174,6 +174,13 @@ class BatchRestorer {
     for (size_t i = 0; i < image_.moved.slots.size(); ++i) {
       mesh_.MoveTo(VertexId(image_.moved.slots[i]), image_.moved.positions[i]);
     }
+  }
+
+  /// Those of this state. Duplicates come last, so that a roll-back ends them first, as DuplicatesFirst().
+  absl::Status PutBackThose(EntityKind kind, uint8_t duplicate) {
+    return ForEachEntity(kind, image_.ended[Dimension(kind)], [&](const EntityView& view) {
+      return (view.state & BatchImage::kDuplicate) == duplicate ? PutBack(view) : absl::OkStatus();
+    });
   }
 
   absl::Status PutBack(const EntityView& view) {

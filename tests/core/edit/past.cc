@@ -75,7 +75,8 @@ void ExpectBirthsOfDifference(const Mesh& mesh, const Mesh& before) {
   for (EntityKind kind : kEntityKinds) {
     mesh.slots(kind).live().ForEach([&](Slot slot) {
       const Stamp born = mesh.slots(kind).Born(slot);
-      if (IsAnother(mesh, before, {kind, slot})) EXPECT_EQ(born, static_cast<Stamp>(mesh.revision()));
+      const bool is_new = born == static_cast<Stamp>(mesh.revision());
+      EXPECT_EQ(IsAnother(mesh, before, {kind, slot}), is_new) << EntityKindName(kind) << " " << slot;
     });
   }
 }

@@ -91,7 +91,7 @@ TEST(RestoreRevisionTest, LeavesColumnsAddedSinceWithoutTheirRows) {
   Do(past, {AddAttributeEdit{old}, SetAttributeEdit{old, {0}, {1, 2, 3, 4}}});
   Do(past, {AddAttributeEdit{young}, SetAttributeEdit{young, {0, 2}, {1, 2, 3, 4}}});
   Do(past, {RemoveElementsEdit{EntityKind::kCell, {0}}, RemoveVerticesEdit{{2}}});
-  Do(past, {AddVerticesEdit{{{4, 4, 4}}}, SetAttributeEdit{young, {2}, {9, 9}}});
+  Do(past, {AddVerticesEdit{{{4, 4, 4}}}, SetAttributeEdit{young, {kFirstNew}, {9, 9}}});
   past.GoBackTo(1);
   ASSERT_EQ(past.mesh().attributes().size(), 2u);
   EXPECT_EQ(past.mesh().attributes()[0].Row(0), std::vector<uint8_t>({1, 2, 3, 4}));
@@ -119,9 +119,13 @@ TEST(RestoreRevisionTest, TurnsWhatNoStampSaysWasTurned) {
   const Mesh& mesh = past.mesh();
   const FaceId f = mesh.Faces(CellId(0))[1].face();
   const auto order = mesh.Vertices(f);
-  const std::vector<Slot> turned = {order[1].slot(), order[0].slot(), order[2].slot()};
-  Do(past,
-     {AddElementsEdit{ElementType::kTriangle, turned}, RemoveElementsEdit{EntityKind::kFace, {f.slot()}}});
+  const std::vector<VertexId> turned = {order[1], order[0], order[2]};
+  past.mesh().BeginBatch();
+  ASSERT_TRUE(past.mesh().AddElement(ElementType::kTriangle, turned).ok());
+  ASSERT_TRUE(past.mesh().RemoveElement(f).ok());
+  ASSERT_TRUE(past.keeper().Keep(past.mesh()).ok());
+  Commit(past.mesh());
+  past.Note();
   const Stamp stamped = mesh.changed(EntityKind::kFace).At(f.slot());
   past.GoBackTo(0);
   EXPECT_EQ(mesh.changed(EntityKind::kFace).At(f.slot()), stamped)
@@ -315,12 +319,16 @@ TEST(RestoreRevisionTest, AnEntityThatIsAnotherIsNamed) {
   Commit(mesh);
   ASSERT_TRUE(mesh.MoveVertex(VertexId(3), {2, 2, 2}).ok());
   Commit(mesh);
-  ASSERT_TRUE(other.RemoveElements(EntityKind::kCell, {0}).ok());
+  const auto corners = other.Vertices(CellId(0));
+  const std::vector<VertexId> same(corners.begin(), corners.end());
+  ASSERT_TRUE(other.RemoveElement(CellId(0)).ok());
   Commit(other);
-  ASSERT_TRUE(ApplyBatch(other, {AddElementsEdit{ElementType::kTetrahedron, {3, 1, 2, 0}}}, {}).ok());
+  ASSERT_TRUE(other.AddElement(ElementType::kTetrahedron, same).ok());
+  Commit(other);
   const absl::Status status = RefusalOf(mesh, other);
   EXPECT_EQ(ErrorReason(status), reason::kBadArgument);
-  EXPECT_FALSE(GetErrorDetail(status)->Find("kind").empty());
+  EXPECT_EQ(GetErrorDetail(status)->Find("kind"), "edge");
+  EXPECT_FALSE(GetErrorDetail(status)->Find("ids").empty());
 }
 
 TEST(RestoreRevisionTest, OtherMeshesAreRefused) {

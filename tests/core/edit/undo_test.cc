@@ -85,6 +85,23 @@ TEST(UndoTest, ForgetsAnEdgeWithAllItsDuplicates) {
   chronicle.UndoAndRedoAll();
 }
 
+TEST(UndoTest, RollsBackADuplicateWithALowerIdThanTheEdgeItRepeats) {
+  Mesh mesh;
+  AddVertices(mesh, 3);
+  ASSERT_TRUE(mesh.StoreRelation({EntityKind::kVertex, EntityKind::kVertex}, true).ok());
+  Add(mesh, ElementType::kWireEdge, {1, 2});
+  Add(mesh, ElementType::kWireEdge, {0, 1});
+  Commit(mesh);
+  ASSERT_TRUE(mesh.RemoveElement(EdgeId(0)).ok());
+  Commit(mesh);
+  ASSERT_EQ(Add(mesh, ElementType::kWireEdge, {0, 1}), EntityId(EdgeId(0)));
+  Commit(mesh);
+  Chronicle chronicle(std::move(mesh));
+  chronicle.Do({RemoveElementsEdit{EntityKind::kEdge, {0, 1}}});
+  chronicle.UndoInVain(1);
+  chronicle.UndoAndRedoAll();
+}
+
 TEST(UndoTest, TurnsFacesAndEdgesBackThatBecameElements) {
   Chronicle chronicle(TetGrid(1, 1, 1));
   Mesh& mesh = chronicle.mesh();
