@@ -282,7 +282,8 @@ class Session : public std::enable_shared_from_this<Session> {
                       std::shared_ptr<const RepairOutcome> outcome, size_t bytes)
       ABSL_LOCKS_EXCLUDED(repairs_mu_);
 
-  /// Changes settings; no revision is made. All or nothing. Takes the writer lock for as long as that takes.
+  /// Changes settings, on disk too; no revision is made. All or nothing. Takes the writer lock for as long as
+  /// that takes.
   /// Errors: those of StoreJust; ABORTED ETAG_MISMATCH (an empty `etag` fits any).
   absl::Status Update(const SettingsUpdate& update, absl::string_view etag,
                       const StopSignal& stop = StopSignal::Never()) ABSL_LOCKS_EXCLUDED(mu_, settings_mu_);
@@ -398,6 +399,8 @@ class Session : public std::enable_shared_from_this<Session> {
   /// Stores what is to be adopted. After success nobody else edits until that is done.
   absl::Status StoreImport(const Mesh& mesh, const LoggedRequest& request) ABSL_LOCKS_EXCLUDED(mu_);
   absl::Status StoreIdentity() ABSL_LOCKS_EXCLUDED(mu_);
+  absl::Status ChangeSettings(const SettingsUpdate& update, absl::string_view etag, const StopSignal& stop)
+      ABSL_LOCKS_EXCLUDED(mu_, settings_mu_);
 
   // session_unloading.cc
   AnswerMemory<ImportOutcome> CopyImports() const ABSL_LOCKS_EXCLUDED(imports_mu_);
@@ -431,7 +434,7 @@ class Session : public std::enable_shared_from_this<Session> {
   std::atomic<uint64_t> history_bytes_{0};
   std::atomic<uint64_t> measured_bytes_{0};  ///< mesh and answers
 
-  Mutex identity_mu_;  ///< held while the identity is stored
+  Mutex identity_mu_;  ///< held while settings are changed and stored
   mutable Mutex settings_mu_;
   CheckSettings checks_ ABSL_GUARDED_BY(settings_mu_);
   Retention retention_ ABSL_GUARDED_BY(settings_mu_);  ///< its own; the log has it with the daemon's

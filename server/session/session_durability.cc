@@ -208,7 +208,6 @@ absl::Status Session::StoreImport(const Mesh& mesh, const LoggedRequest& request
 }
 
 absl::Status Session::StoreIdentity() {
-  MutexLock lock(&identity_mu_);
   DYNMESH_RETURN_IF_ERROR(Read([](const SessionView&) { return absl::OkStatus(); }));
   const SessionIdentity identity{uid_,
                                  create_time_,

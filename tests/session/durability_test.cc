@@ -295,6 +295,23 @@ TEST_F(DurabilityTest, AnImportThatCannotBeStoredLeavesTheSessionEmpty) {
   EXPECT_TRUE(after->Adopt(mesh).ok());
 }
 
+TEST_F(DurabilityTest, SettingsThatCannotBeStoredStayAsTheyWere) {
+  const SessionPtr session = daemon_->NewSession("mesh", {.stored_relations = {kStorableRelations[1]}});
+  MustApply(*session, AddTet());
+  const SessionInfo before = *session->Info();
+  medium_.Fail(absl::ResourceExhaustedError("the disk is full"));
+  CheckSettings checks;
+  ASSERT_TRUE(checks.Set(CheckKind::kMinDihedral, {Severity::kReject, 0.25}).ok());
+  const SettingsUpdate update{.stored_relations = std::vector<Relation>{kStorableRelations[0]},
+                              .checks = checks,
+                              .retention = Retention{.max_revisions = 9}};
+  EXPECT_FALSE(session->Update(update, "").ok());
+  EXPECT_EQ(session->Info()->settings.stored_relations, before.settings.stored_relations);
+  EXPECT_TRUE(session->checks() == before.settings.checks);
+  EXPECT_EQ(session->retention(), before.settings.retention);
+  medium_.Fail(absl::OkStatus());
+}
+
 // ---- What is found damaged ----
 
 TEST_F(DurabilityTest, ADamagedSessionIsSetAsideAndOthersServe) {

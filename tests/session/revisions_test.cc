@@ -167,6 +167,27 @@ TEST_F(RevisionsTest, RevisionsAreListedWithWhoMadeThemAndHow) {
   }
 }
 
+TEST_F(RevisionsTest, AnImportThatACrashCutShortIsForgotten) {
+  daemon_->NewSession();
+  daemon_.reset();
+  {
+    const std::unique_ptr<Store> store = medium_.Open();
+    const Origin never{1, 10, absl::Now(), {LoggedCall::kImport, {}, 0, {}, {"bob", "never made"}}};
+    ASSERT_TRUE((*store->OpenSession("mesh"))->PutValue(kOriginName, EncodeOrigin(never)).ok());
+  }
+  Restart();
+  MustApply(*Find(), {AddVerticesEdit{{{0, 0, 0}}}}, {.note = {"ann", "made"}});
+  Restart({.kept_answers = {0, 0}, .retention = {.max_revisions = 1}});
+  const SessionPtr session = Find();
+  const RevisionList list = *ListRevisions(*session, 0, 10);
+  ASSERT_EQ(list.revisions.size(), 1u);
+  EXPECT_EQ(list.revisions[0].call, LoggedCall::kEdit);
+  EXPECT_EQ(list.revisions[0].note.author, "ann");
+  MakeCheckpoint(*session);
+  for (const RevisionInfo& each : ListRevisions(*session, 0, 10)->revisions)
+    EXPECT_NE(each.note.author, "bob");
+}
+
 TEST_F(RevisionsTest, APageOfRevisionsEndsWhereTheNextBegins) {
   const SessionPtr session = daemon_->NewSession();
   EditAtRandom(*session, 30);
