@@ -408,8 +408,9 @@ absl::Status Session::CheckEmpty() const {
 }
 
 absl::Status Session::Adopt(Mesh& mesh) {
-  DYNMESH_RETURN_IF_ERROR(CheckEmpty());  // else the lock may be busy for long
-  if (log_ != nullptr) DYNMESH_RETURN_IF_ERROR(StoreImport(mesh));
+  DYNMESH_RETURN_IF_ERROR(CheckEmpty());       // else the lock may be busy for long
+  const absl::Time commit_time = absl::Now();  // as the store has it
+  if (log_ != nullptr) DYNMESH_RETURN_IF_ERROR(StoreImport(mesh, commit_time));
   {
     WriterMutexLock lock(&mu_);
     const absl::Status adopted =
@@ -417,6 +418,7 @@ absl::Status Session::Adopt(Mesh& mesh) {
     if (!adopted.ok() && stores_import_) log_->Fail(adopted);  // the store has what this has not
     stores_import_ = false;
     if (!adopted.ok()) return adopted;
+    commit_time_ = commit_time;
   }
   followers_->Wake();  // an import is on disk before it is seen
   return absl::OkStatus();

@@ -346,7 +346,7 @@ class Session : public std::enable_shared_from_this<Session> {
   void StartCheckpoint();
   void WriteCheckpoint();
   /// Stores what is to be adopted. After success nobody else edits until that is done.
-  absl::Status StoreImport(const Mesh& mesh) ABSL_LOCKS_EXCLUDED(mu_);
+  absl::Status StoreImport(const Mesh& mesh, absl::Time commit_time) ABSL_LOCKS_EXCLUDED(mu_);
   absl::Status StoreIdentity() ABSL_LOCKS_EXCLUDED(mu_);
 
   // session_unloading.cc

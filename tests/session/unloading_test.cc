@@ -249,12 +249,14 @@ TEST_F(UnloadingTest, FollowersGoOnFromWhereTheyWereOnTheSameGrid) {
   }
   Unload();
   const SessionPtr session = *registry().Find("mesh");  // may still be loading
+  RecordingSink late(daemon_->workers(), RecordingSink::Acknowledge::kByHand);
+  ASSERT_TRUE(late.Follow(session, {.from_revision = 1, .session_uid = session->uid()}).ok());
+  EXPECT_EQ(late.TakeOne()->revision, 1) << "it has everything";
   RecordingSink sink(daemon_->workers(), RecordingSink::Acknowledge::kAtOnce, Mirror::Geometry::kQuantized);
-  ASSERT_TRUE(
-      sink.Follow(session, {.from_revision = 1, .session_uid = session->uid(), .position_bits = 8}).ok());
-  sink.AwaitRevision(1);
+  ASSERT_TRUE(sink.Follow(session, quantised).ok());
   MustApply(*Find(), {AddVerticesEdit{{{100, 100, 100}}}});
   sink.AwaitRevision(2);
+  EXPECT_EQ(late.TakeOne()->from_revision, 1);
   const std::map<int, QuantizationGrid> after = session->deltas().grids();
   ASSERT_EQ(after.size(), 1u);
   EXPECT_EQ(after.at(8).origin, grids.at(8).origin);
@@ -270,6 +272,8 @@ TEST_F(UnloadingTest, WhatCannotBeReadAgainIsTriedAgain) {
   EXPECT_EQ(Find()->Apply(AddTet(), {}).status().code(), absl::StatusCode::kUnavailable);
   EXPECT_EQ(Sweep(), 0u) << "there is nothing to unload";
   medium_.FailReads(absl::OkStatus());
+  const absl::Time deadline = absl::Now() + kPatience;
+  while (Find()->state() != SessionState::kLoaded) ASSERT_LT(absl::Now(), deadline);
   ExpectSame(*Find(), memory);
   MustApply(*Find(), AddTet());
 }
