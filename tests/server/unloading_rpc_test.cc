@@ -16,11 +16,14 @@ namespace {
 
 class UnloadingRpcTest : public ServerTest {
  protected:
-  UnloadingRpcTest() { Start({.idle_timeout = absl::ZeroDuration()}); }
+  UnloadingRpcTest() { Start(absl::ZeroDuration()); }
   ~UnloadingRpcTest() override { StartServer(Limits()); }  // the directory goes first
 
-  void Start(ServerOptions options) {
+  void Start(absl::Duration idle_timeout, uint64_t max_loaded_bytes = 0) {
+    ServerOptions options;
     options.data_dir = directory_.path();
+    options.idle_timeout = idle_timeout;
+    options.max_loaded_bytes = max_loaded_bytes;
     StartServerWith(std::move(options));
   }
 
@@ -46,7 +49,7 @@ class UnloadingRpcTest : public ServerTest {
 };
 
 TEST_F(UnloadingRpcTest, TheServerUnloadsWhatIsIdleAndLoadsWhatIsUsed) {
-  Start({.idle_timeout = absl::Milliseconds(1)});
+  Start(absl::Milliseconds(1));
   ASSERT_TRUE(CreateSession("mesh").ok());
   for (int64_t revision = 1; revision <= 3; ++revision) {
     EXPECT_EQ(MustApply(TetBatch("mesh")).revision(), revision);
@@ -60,7 +63,7 @@ TEST_F(UnloadingRpcTest, TheServerUnloadsWhatIsIdleAndLoadsWhatIsUsed) {
 }
 
 TEST_F(UnloadingRpcTest, ABudgetThatIsTooSmallUnloadsWhatIsNotUsed) {
-  Start({.idle_timeout = absl::ZeroDuration(), .max_loaded_bytes = 1});
+  Start(absl::ZeroDuration(), 1);
   for (const char* name : {"a", "b"}) {
     ASSERT_TRUE(CreateSession(name).ok());
     ASSERT_TRUE(Import(name, TetGrid(3, 3, 3)).ok());
@@ -143,7 +146,7 @@ TEST_F(UnloadingRpcTest, NoCallFailsBecauseSessionsAreUnloaded) {
     importer.join();
   }
   RecordProperty("num_unloaded", static_cast<int>(num_unloaded));
-  Start({});
+  Start(absl::ZeroDuration());
   EXPECT_EQ(GetSession("mesh").counts().cells(), uint64_t{kRounds});
   EXPECT_EQ(GetSession("streamed").counts().cells(), uint64_t{kRounds});
 }
