@@ -25,6 +25,7 @@
 #include "absl/time/time.h"
 #include "server/health_probe.h"
 #include "server/server.h"
+#include "server/session/heap.h"
 #include "spdlog/sinks/stdout_sinks.h"
 #include "spdlog/spdlog.h"
 
@@ -236,6 +237,7 @@ void ExitAt(absl::Time deadline) {
 }
 
 int Serve() {
+  ReturnLargeBlocks();
   const sigset_t signals = BlockSignals();
   if (absl::GetFlag(FLAGS_exit_with_parent) && !TieToParent()) return EXIT_FAILURE;
   absl::StatusOr<std::unique_ptr<Server>> server = Server::Start(OptionsFromFlags());

@@ -146,9 +146,6 @@ absl::StatusOr<std::unique_ptr<Store>> OpenStore(const ServerOptions& options) {
     return InvalidArgument(reason::kBadArgument, "async_delay is outside 0 to 10 s",
                            {{"field", "async_delay"}});
   }
-  if (options.idle_timeout < absl::ZeroDuration()) {
-    return InvalidArgument(reason::kBadArgument, "idle_timeout is negative", {{"field", "idle_timeout"}});
-  }
   if (options.retention.max_age < absl::ZeroDuration()) {
     return InvalidArgument(reason::kBadArgument, "retain_age is negative", {{"field", "retain_age"}});
   }
@@ -291,6 +288,9 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(const ServerOptions& optio
   for (const std::string& address : options.listen) {
     DYNMESH_RETURN_IF_ERROR(SplitAddress(address).status());
     if (!options.allow_insecure) DYNMESH_RETURN_IF_ERROR(CheckLoopback(address));
+  }
+  if (options.idle_timeout < absl::ZeroDuration()) {
+    return InvalidArgument(reason::kBadArgument, "idle_timeout is negative", {{"field", "idle_timeout"}});
   }
   gpr_set_log_function(LogForGrpc);
   grpc::EnableDefaultHealthCheckService(true);

@@ -69,6 +69,7 @@ void Executor::Work() {
       return absl::OkStatus();
     });
     if (!status.ok()) spdlog::error("task_failed executor={} error=\"{}\"", options_.name, status.ToString());
+    task = nullptr;  // what it owns is not kept until there is another one
   }
 }
 

@@ -441,8 +441,9 @@ absl::Status Session::CheckEmpty() const {
 }
 
 absl::Status Session::Adopt(Mesh& mesh, const LoggedRequest& request) {
-  DYNMESH_RETURN_IF_ERROR(CheckEmpty());  // else the lock may be busy for long
-  if (log_ != nullptr) DYNMESH_RETURN_IF_ERROR(StoreImport(mesh, request));
+  DYNMESH_RETURN_IF_ERROR(CheckEmpty());                 // else the lock may be busy for long
+  const absl::Time commit_time = NowToTheMicrosecond();  // as the store has it
+  if (log_ != nullptr) DYNMESH_RETURN_IF_ERROR(StoreImport(mesh, commit_time, request));
   {
     WriterMutexLock lock(&mu_);
     const absl::Status adopted =
@@ -450,6 +451,7 @@ absl::Status Session::Adopt(Mesh& mesh, const LoggedRequest& request) {
     if (!adopted.ok() && stores_import_) log_->Fail(adopted);  // the store has what this has not
     stores_import_ = false;
     if (!adopted.ok()) return adopted;
+    commit_time_ = commit_time;
   }
   followers_->Wake();  // an import is on disk before it is seen
   return absl::OkStatus();

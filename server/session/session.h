@@ -397,7 +397,8 @@ class Session : public std::enable_shared_from_this<Session> {
   void StartCheckpoint();
   void WriteCheckpoint();
   /// Stores what is to be adopted. After success nobody else edits until that is done.
-  absl::Status StoreImport(const Mesh& mesh, const LoggedRequest& request) ABSL_LOCKS_EXCLUDED(mu_);
+  absl::Status StoreImport(const Mesh& mesh, absl::Time commit_time, const LoggedRequest& request)
+      ABSL_LOCKS_EXCLUDED(mu_);
   absl::Status StoreIdentity() ABSL_LOCKS_EXCLUDED(mu_);
   absl::Status ChangeSettings(const SettingsUpdate& update, absl::string_view etag, const StopSignal& stop)
       ABSL_LOCKS_EXCLUDED(mu_, settings_mu_);

@@ -192,15 +192,14 @@ void Session::WriteCheckpoint() {
 // ---- What is stored beside batches ----
 
 // Edits meanwhile would be no part of what is stored.
-absl::Status Session::StoreImport(const Mesh& mesh, const LoggedRequest& request) {
+absl::Status Session::StoreImport(const Mesh& mesh, absl::Time commit_time, const LoggedRequest& request) {
   {
     WriterMutexLock lock(&mu_);
     DYNMESH_RETURN_IF_ERROR(CheckEditable());
     DYNMESH_RETURN_IF_ERROR(CheckEmpty());
     stores_import_ = true;
   }
-  const absl::Status stored =
-      CatchExceptions([&] { return log_->StoreAll(mesh, NowToTheMicrosecond(), request); });
+  const absl::Status stored = CatchExceptions([&] { return log_->StoreAll(mesh, commit_time, request); });
   if (stored.ok()) return stored;
   WriterMutexLock lock(&mu_);
   stores_import_ = false;

@@ -12,7 +12,7 @@ namespace dynmesh {
 
 bool Session::CanUnload() const {
   if (log_ == nullptr || state() != SessionState::kLoaded || writes_checkpoint_) return false;
-  if (revision() == 0 || log_->durable_revision() != revision() || !log_->status().ok()) return false;
+  if (revision() == 0 || log_->durable_revision() != revision()) return false;
   ReaderMutexLock lock(&mu_);
   return gone_.ok() && !stores_import_;
 }

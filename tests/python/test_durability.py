@@ -6,7 +6,7 @@ import dynmesh
 import pytest
 from dynmesh.daemon import find_daemon
 from shapes import two_tets
-from waiting import await_serving
+from waiting import await_serving, await_state
 
 
 def test_a_session_is_there_again_with_its_ids(tmp_path):
@@ -91,3 +91,26 @@ def test_a_retry_after_a_restart_gets_the_first_answer(tmp_path):
     with dynmesh.launch(data_dir=tmp_path) as daemon:
         assert add(daemon) == first
         assert daemon.client.session("part").info().counts.vertices == 2
+
+
+def test_an_idle_session_is_unloaded_and_comes_back(tmp_path):
+    with dynmesh.launch(data_dir=tmp_path, idle_timeout=0.001) as daemon:
+        client = daemon.client
+        session = client.create_session("part")
+        session.import_mesh(two_tets(), progress=False)
+        before = session.info()
+        await_state(client, "part", "stored")
+        after = session.info()
+        assert (after.state, after.revision, after.checksum) == ("loaded", 1, before.checksum)
+        with session.edit() as batch:
+            batch.add_vertices([[9, 9, 9]])
+        assert batch.result.revision == 2
+
+
+def test_a_memory_budget_unloads_what_is_not_used(tmp_path):
+    with dynmesh.launch(data_dir=tmp_path, idle_timeout=0, max_loaded_bytes=1) as daemon:
+        for name in ("one", "two"):
+            daemon.client.create_session(name).import_mesh(two_tets(), progress=False)
+        for name in ("one", "two"):
+            await_state(daemon.client, name, "stored")
+        assert daemon.client.session("one").info().counts.cells == 2

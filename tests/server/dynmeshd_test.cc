@@ -15,10 +15,14 @@
 #include <thread>
 
 #include "absl/strings/match.h"
+#include "absl/strings/numbers.h"
 #include "absl/strings/str_split.h"
+#include "absl/strings/strip.h"
 #include "absl/time/clock.h"
 #include "server/health_probe.h"
 #include "tests/server/server_support.h"
+#include "tests/store/temporary_directory.h"
+#include "tests/support/meshes.h"
 
 namespace dynmesh::testing {
 namespace {
@@ -66,6 +70,20 @@ class Process {
     EXPECT_EQ(waitpid(pid_, &status, 0), pid_);
     running_ = false;
     return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
+  }
+
+  /// Memory that it holds at the moment, in bytes.
+  uint64_t resident_bytes() const {
+    for (absl::string_view line :
+         absl::StrSplit(ReadFile("/proc/" + std::to_string(pid_) + "/status"), '\n')) {
+      uint64_t kib = 0;
+      if (absl::ConsumePrefix(&line, "VmRSS:") && absl::ConsumeSuffix(&line, " kB") &&
+          absl::SimpleAtoi(line, &kib)) {
+        return kib << 10;
+      }
+    }
+    ADD_FAILURE() << "no VmRSS";
+    return 0;
   }
 
   std::string output() const { return ReadFile(output_path_); }
@@ -215,6 +233,86 @@ TEST_F(DynmeshdTest, EndsInTimeWhateverItDoes) {
   EXPECT_LT(absl::Now() - begin, absl::Seconds(6));
 }
 
+v1::Session GetSession(v1::SessionService::Stub& sessions, const std::string& name) {
+  PatientContext context;
+  v1::GetSessionRequest request;
+  request.set_name(name);
+  v1::GetSessionResponse response;
+  EXPECT_TRUE(sessions.GetSession(&context, request, &response).ok());
+  return response.session();
+}
+
+/// Bytes that the process holds while somebody follows a session at revision 1, which keeps it loaded and is
+/// sent nothing.
+uint64_t ResidentWhileFollowed(const Process& process, v1::SubscriptionService::Stub& subscriptions,
+                               const std::string& name) {
+  PatientContext context;
+  v1::SubscribeRequest request;
+  request.set_session(name);
+  request.set_from_revision(1);
+  const auto stream = subscriptions.Subscribe(&context, request);
+  v1::SubscribeResponse response;
+  EXPECT_TRUE(stream->Read(&response));
+  const uint64_t bytes = process.resident_bytes();
+  context.TryCancel();
+  EXPECT_FALSE(stream->Finish().ok());
+  return bytes;
+}
+
+/// Waits until the process holds no more than `target` bytes, or for long; returns what it holds.
+uint64_t AwaitResident(const Process& process, uint64_t target) {
+  const absl::Time deadline = absl::Now() + kPatience;
+  uint64_t bytes = process.resident_bytes();
+  while (bytes > target && absl::Now() < deadline) {
+    std::this_thread::yield();
+    bytes = process.resident_bytes();
+  }
+  return bytes;
+}
+
+TEST_F(DynmeshdTest, MemoryOfUnloadedSessionsGoesBackToTheSystem) {
+#if defined(__SANITIZE_ADDRESS__)
+  GTEST_SKIP() << "freed memory is kept in quarantine";
+#endif
+  const TemporaryDirectory directory;
+  Process process({"--listen=127.0.0.1:0", "--ready_file=" + ready_file_, "--data_dir=" + directory.path(),
+                   "--idle_timeout=100ms"},
+                  {});
+  const auto addresses = AwaitReady();
+  ASSERT_EQ(addresses.size(), 1u);
+  const auto channel = grpc::CreateChannel(addresses[0], grpc::InsecureChannelCredentials());
+  const auto sessions = v1::SessionService::NewStub(channel);
+  const auto subscriptions = v1::SubscriptionService::NewStub(channel);
+  {
+    PatientContext context;
+    v1::CreateSessionRequest request;
+    request.set_name("grid");
+    v1::CreateSessionResponse response;
+    ASSERT_TRUE(sessions->CreateSession(&context, request, &response).ok());
+  }
+  ASSERT_TRUE(SendImport(*sessions, ImportOf("grid", TetGrid(26, 26, 26), 50'000)).ok());
+  const v1::Session before = GetSession(*sessions, "grid");
+  ASSERT_GT(before.counts().cells(), 100'000u);
+  uint64_t left_first = 0;
+  for (int round = 0; round < 3; ++round) {
+    const uint64_t loaded = ResidentWhileFollowed(process, *subscriptions, "grid");
+    const uint64_t target = loaded - std::min(loaded, before.memory_bytes() / 5 * 4);
+    const uint64_t left = AwaitResident(process, target);
+    EXPECT_LE(left, target) << loaded << " bytes became " << left << ", the session holds "
+                            << before.memory_bytes() << "\n"
+                            << process.output();
+    if (round == 0) left_first = left;
+    EXPECT_LE(left, left_first + before.memory_bytes() / 2) << "more stays each time";
+  }
+  EXPECT_TRUE(absl::StrContains(process.output(), "session_unloaded name=grid bytes=")) << process.output();
+  const v1::Session after = GetSession(*sessions, "grid");
+  EXPECT_EQ(after.checksum().topology(), before.checksum().topology());
+  EXPECT_EQ(after.checksum().geometry(), before.checksum().geometry());
+  EXPECT_EQ(after.etag(), before.etag());
+  process.Signal(SIGTERM);
+  EXPECT_EQ(process.Wait(), 0);
+}
+
 TEST_F(DynmeshdTest, TheEnvironmentStandsInForFlags) {
   const std::string socket = ::testing::TempDir() + "dynmeshd-" + std::to_string(getpid()) + ".sock";
   Process process({"--ready_file=" + ready_file_, "--listen="},
@@ -261,6 +359,7 @@ TEST_F(DynmeshdTest, WrongCallsSayWhatIsWrong) {
   expect("DYNMESHD_MAX_SESSIONS", {}, {"DYNMESHD_MAX_SESSIONS=many"});
   expect("host:port", {"--listen=7447"});
   expect("log_level", {"--log_level=loud"});
+  expect("idle_timeout", {"--idle_timeout=-1s"});
   expect("nothing to listen on", {"--listen="});
 }
 

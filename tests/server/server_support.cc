@@ -52,12 +52,16 @@ std::vector<Point> SomePoints(int n) {
 PatientContext::PatientContext() { set_deadline(absl::ToChronoTime(absl::Now() + kPatience)); }
 
 void ServerTest::StartServer(const Limits& limits, const std::string& data_dir) {
-  spdlog::set_level(spdlog::level::err);
-  server_ = nullptr;
   ServerOptions options;
-  options.listen = {"127.0.0.1:0"};
   options.limits = limits;
   options.data_dir = data_dir;
+  StartServerWith(options);
+}
+
+void ServerTest::StartServerWith(ServerOptions options) {
+  spdlog::set_level(spdlog::level::err);
+  server_ = nullptr;
+  options.listen = {"127.0.0.1:0"};
   auto started = Server::Start(options);
   ASSERT_TRUE(started.ok()) << started.status();
   server_ = *std::move(started);
@@ -126,6 +130,16 @@ grpc::Status ServerTest::DeleteSession(const std::string& name, const std::strin
 
 grpc::Status ServerTest::Import(const std::string& session, const Mesh& mesh, v1::ImportResult* result,
                                 size_t chunk_items) {
+  return ImportRequests(ImportOf(session, mesh, chunk_items), result);
+}
+
+grpc::Status ServerTest::ImportRequests(const std::vector<v1::ImportMeshRequest>& requests,
+                                        v1::ImportResult* result) {
+  return SendImport(sessions(), requests, result);
+}
+
+std::vector<v1::ImportMeshRequest> ImportOf(const std::string& session, const Mesh& mesh,
+                                            size_t chunk_items) {
   std::vector<v1::ImportMeshRequest> requests = {ImportHead(session)};
   std::vector<Point> points;
   mesh.slots(EntityKind::kVertex).live().ForEach([&](Slot slot) {
@@ -154,13 +168,13 @@ grpc::Status ServerTest::Import(const std::string& session, const Mesh& mesh, v1
     });
     flush();
   }
-  return ImportRequests(requests, result);
+  return requests;
 }
 
-grpc::Status ServerTest::ImportRequests(const std::vector<v1::ImportMeshRequest>& requests,
-                                        v1::ImportResult* result) {
+grpc::Status SendImport(v1::SessionService::Stub& sessions,
+                        const std::vector<v1::ImportMeshRequest>& requests, v1::ImportResult* result) {
   PatientContext context;
-  const auto stream = sessions().ImportMesh(&context);
+  const auto stream = sessions.ImportMesh(&context);
   for (const v1::ImportMeshRequest& request : requests) {
     if (!stream->Write(request)) break;
   }

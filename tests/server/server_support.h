@@ -62,6 +62,8 @@ class ServerTest : public ::testing::Test {
 
   /// Replaces the server by a new one.
   void StartServer(const Limits& limits, const std::string& data_dir = "");
+  /// The same; listens on a port of its own, whatever the options say.
+  void StartServerWith(ServerOptions options);
   Server& server() { return *server_; }
   const std::string& address() const { return server_->addresses()[0]; }
   /// A channel that shares no connection with others.
@@ -105,7 +107,15 @@ class PatientContext : public grpc::ClientContext {
   PatientContext();
 };
 
+/// Sends `requests` and half-closes.
+grpc::Status SendImport(v1::SessionService::Stub& sessions,
+                        const std::vector<v1::ImportMeshRequest>& requests,
+                        v1::ImportResult* result = nullptr);
+
 /// Builders of requests.
+/// What imports vertices and elements as they stand in `mesh`, by ascending dimension.
+std::vector<v1::ImportMeshRequest> ImportOf(const std::string& session, const Mesh& mesh,
+                                            size_t chunk_items = 1000);
 v1::ApplyEditsRequest Batch(const std::string& session);
 v1::AddVertices AddVerticesMessage(const std::vector<Point>& points);
 v1::ElementBlock Block(v1::ElementType type, const std::vector<Slot>& vertices);

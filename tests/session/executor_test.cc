@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <chrono>
+#include <memory>
 #include <semaphore>
 #include <stdexcept>
 
@@ -59,6 +61,17 @@ TEST(ExecutorTest, SurvivesExceptions) {
   executor.Post([&] { ran = true; });
   executor.Stop();
   EXPECT_TRUE(ran);
+}
+
+TEST(ExecutorTest, WhatATaskOwnsIsGoneWhenItHasRun) {
+  Executor executor({"test", 1, 10});
+  std::binary_semaphore gone{0};
+  std::shared_ptr<int> owned(new int(0), [&](int* number) {
+    delete number;
+    gone.release();
+  });
+  executor.Post([owned = std::move(owned)] {});
+  EXPECT_TRUE(gone.try_acquire_for(std::chrono::seconds(60))) << "kept until there is another task";
 }
 
 TEST(TimerTest, CallsInOrderOfTimeAndNotBefore) {

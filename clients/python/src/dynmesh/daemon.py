@@ -169,7 +169,7 @@ def launch(
         f"--listen={listen or ''}",
         "--exit_with_parent",
         *([] if data_dir is None else [f"--data_dir={Path(data_dir).absolute()}"]),
-        *([] if idle_timeout is None else [f"--idle_timeout={idle_timeout:f}s"]),
+        *([] if idle_timeout is None else [f"--idle_timeout={idle_timeout:.9f}s"]),
         *([] if max_loaded_bytes is None else [f"--max_loaded_bytes={max_loaded_bytes:d}"]),
         *flags,
     ]
