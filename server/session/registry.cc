@@ -57,6 +57,7 @@ absl::StatusOr<SessionInfo> SessionRegistry::CreateFrom(SessionSeed seed) {
   DYNMESH_RETURN_IF_ERROR(CheckSessionName(seed.name));
   DYNMESH_RETURN_IF_ERROR(CheckRequestId(seed.request_id));
   DYNMESH_RETURN_IF_ERROR(Prepare(seed));
+  if (seed.validate_only) return DescribeSeed(seed);
   MutexLock lock(&create_mu_);
   return CreateOnce(seed);
 }
@@ -78,6 +79,19 @@ absl::Status SessionRegistry::Prepare(SessionSeed& seed) const {
     seed.settings.durability = store_ == nullptr ? SessionDurability::kNone : SessionDurability::kSync;
   }
   return absl::OkStatus();
+}
+
+absl::StatusOr<SessionInfo> SessionRegistry::DescribeSeed(SessionSeed& seed) const {
+  DYNMESH_RETURN_IF_ERROR(CheckCreation(seed.name));
+  if (seed.settings.durability != SessionDurability::kNone && store_ == nullptr) return NoStore();
+  Session::Options options{seed.name, seed.settings, limits_, workers_};
+  options.create_time = seed.create_time;
+  const auto session = std::make_shared<Session>(options);
+  session->BeginWith(std::move(seed.mesh), seed.commit_time);
+  DYNMESH_ASSIGN_OR_RETURN(SessionInfo info, session->Info());
+  info.uid.clear();
+  info.etag.clear();
+  return info;
 }
 
 absl::StatusOr<SessionInfo> SessionRegistry::CreateOnce(SessionSeed& seed) {

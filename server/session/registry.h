@@ -33,6 +33,7 @@ struct SessionSeed {
   // For retries: the fingerprint is of all that tells the request from others, the name too.
   std::string request_id = {};
   uint64_t fingerprint = 0;
+  bool validate_only = false;  ///< nothing is made; the answer, without uid and etag, is what would be
 };
 
 /// The sessions of a daemon by name.
@@ -49,6 +50,7 @@ class SessionRegistry {
         log_options_(log_options),
         import_gate_(limits),
         answer_budget_(std::make_shared<Budget>("max_answer_bytes", limits.max_answer_bytes)),
+        backup_budget_(std::make_shared<Budget>("max_backup_bytes", limits.max_backup_bytes)),
         adaptation_budget_(
             std::make_shared<Budget>("max_concurrent_adaptations", limits.max_concurrent_adaptations)) {}
 
@@ -95,6 +97,8 @@ class SessionRegistry {
   ImportGate& import_gate() { return import_gate_; }
   /// Of answers that are gathered and wait to be read (max_answer_bytes).
   const std::shared_ptr<Budget>& answer_budget() const { return answer_budget_; }
+  /// Of copies of sessions that backups are written of (max_backup_bytes).
+  const std::shared_ptr<Budget>& backup_budget() const { return backup_budget_; }
   /// Of adaptations that are under way: one each.
   const std::shared_ptr<Budget>& adaptation_budget() const { return adaptation_budget_; }
   const Limits& limits() const { return limits_; }
@@ -102,6 +106,7 @@ class SessionRegistry {
 
  private:
   absl::Status Prepare(SessionSeed& seed) const;
+  absl::StatusOr<SessionInfo> DescribeSeed(SessionSeed& seed) const;
   absl::StatusOr<SessionInfo> CreateOnce(SessionSeed& seed) ABSL_EXCLUSIVE_LOCKS_REQUIRED(create_mu_);
   absl::StatusOr<SessionPtr> MakeSession(SessionSeed& seed);
   absl::StatusOr<std::unique_ptr<SessionLog>> MakeLog(const SessionSeed& seed,
@@ -117,6 +122,7 @@ class SessionRegistry {
   const SessionLogOptions log_options_;
   ImportGate import_gate_;
   const std::shared_ptr<Budget> answer_budget_;
+  const std::shared_ptr<Budget> backup_budget_;
   const std::shared_ptr<Budget> adaptation_budget_;
   Mutex create_mu_;  ///< held while a session is created, which may wait for the disk
   mutable Mutex mu_;

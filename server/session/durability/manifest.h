@@ -6,6 +6,7 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 #include "absl/time/time.h"
+#include "core/codec/bytes.h"
 #include "server/session/session_info.h"
 
 /// What a session's store holds beside records and pages. Formats of their own, sealed by the store.
@@ -17,6 +18,12 @@ struct SessionManifest {
   absl::Time commit_time;
   std::string head;
 };
+
+/// Durability (u8), duplicates (u8), stored relations (their places in kStorableRelations) and checks that
+/// are not as usual (name, severity, threshold); texts and lists begin with their length (varint).
+void WriteSettings(const SessionSettings& settings, ByteWriter& out);
+/// False if the bytes are none, or of no durability that a session can have.
+bool ReadSettings(ByteReader& in, SessionSettings& settings);
 
 std::string EncodeManifest(const SessionManifest& manifest);
 /// Errors: FAILED_PRECONDITION STORE_FORMAT_NEWER; DATA_LOSS STORE_DAMAGED.
@@ -36,9 +43,8 @@ struct SessionIdentity {
 inline constexpr char kIdentityName[] = "identity";
 
 /// Format (varint, 1; 2 where it began at a later revision than 0), uid, creation (int64, us since 1970),
-/// request id, fingerprint (u64), durability (u8), duplicates (u8), stored relations (their places in
-/// kStorableRelations) and checks that are not as usual (name, severity, threshold), in format 2 the revision
-/// at which it began (varint); texts and lists begin with their length (varint).
+/// request id, fingerprint (u64), settings, in format 2 the revision at which it began (varint); texts begin
+/// with their length (varint).
 std::string EncodeIdentity(const SessionIdentity& identity);
 /// Errors: as DecodeManifest.
 absl::StatusOr<SessionIdentity> DecodeIdentity(absl::string_view bytes);

@@ -11,16 +11,11 @@
 
 namespace dynmesh {
 
-namespace {
-
-/// What was let in must come back: live meshes are measured before a batch, and the rebuilder estimates.
-uint64_t MaxBytes(const Limits& limits) {
+uint64_t MaxRebuildBytes(const Limits& limits) {
   constexpr uint64_t kSlack = uint64_t{1} << 30;
   const uint64_t bytes = std::min(limits.max_session_bytes, std::numeric_limits<uint64_t>::max() / 4);
   return 2 * bytes + kSlack;
 }
-
-}  // namespace
 
 absl::StatusOr<RecoveredSession> RecoverSession(SessionStore& store, const Limits& limits) {
   RecoveredSession recovered;
@@ -30,7 +25,7 @@ absl::StatusOr<RecoveredSession> RecoverSession(SessionStore& store, const Limit
   recovered.commit_time = manifest.commit_time;
   recovered.checkpoint_revision = checkpoint->revision;
   DYNMESH_ASSIGN_OR_RETURN(Rebuilder rebuilder,
-                           Rebuilder::Start(manifest.head, {.max_memory_bytes = MaxBytes(limits)}));
+                           Rebuilder::Start(manifest.head, {.max_memory_bytes = MaxRebuildBytes(limits)}));
   const auto add_page = [&](PageKey, absl::string_view bytes) { return rebuilder.AddPage(bytes); };
   DYNMESH_RETURN_IF_ERROR(store.ReadCheckpoint(add_page).status());
   const auto add_record = [&](int64_t revision, absl::string_view bytes) -> absl::Status {
