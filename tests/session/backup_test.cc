@@ -198,7 +198,7 @@ TEST(BackupDamageTest, EveryTruncationIsFound) {
 }
 
 TEST(BackupDamageTest, PartsThatAreSwappedDoubledOrMissingAreFoundWhereTheyAre) {
-  BackupWriter writer(Identity(), TetGrid(12, 12, 12));
+  BackupWriter writer(Identity(), TetGrid(18, 18, 18));
   std::vector<std::string> pieces;
   while (!writer.done()) pieces.push_back(writer.Next());
   ASSERT_GE(pieces.size(), 5u);

@@ -6,6 +6,12 @@
 #include "core/codec/zstd_frame.h"
 
 namespace dynmesh {
+namespace {
+
+/// Less is not worth it.
+constexpr size_t kMinPackedBytes = 512;
+
+}  // namespace
 
 BackupWriter::BackupWriter(BackupIdentity identity, Mesh mesh)
     : identity_(std::move(identity)), mesh_(std::move(mesh)) {
@@ -61,7 +67,7 @@ void BackupWriter::End(std::string& out) {
 }
 
 void BackupWriter::Write(BackupPart part, absl::string_view content, std::string& out) {
-  const std::string frame = CompressFrame(content);
+  const std::string frame = content.size() < kMinPackedBytes ? std::string(content) : CompressFrame(content);
   const bool packed = frame.size() < content.size();
   const absl::string_view bytes = packed ? absl::string_view(frame) : content;
   ByteWriter begin;
