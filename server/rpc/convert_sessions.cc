@@ -66,21 +66,6 @@ struct ExportVisitor {
   }
 };
 
-absl::StatusOr<SessionDurability> ToDurability(v1::Durability durability) {
-  switch (durability) {
-    case v1::DURABILITY_UNSPECIFIED:
-      return SessionDurability::kDefault;
-    case v1::DURABILITY_NONE:
-      return SessionDurability::kNone;
-    case v1::DURABILITY_ASYNC:
-      return SessionDurability::kAsync;
-    case v1::DURABILITY_SYNC:
-      return SessionDurability::kSync;
-    default:
-      return BadField("durability", "there is no such durability");
-  }
-}
-
 v1::Durability FromDurability(SessionDurability durability) {
   switch (durability) {
     case SessionDurability::kDefault:
@@ -127,6 +112,21 @@ absl::StatusOr<std::vector<Relation>> ToStoredRelations(const v1::SessionSetting
 }
 
 }  // namespace
+
+absl::StatusOr<SessionDurability> ToDurability(v1::Durability durability) {
+  switch (durability) {
+    case v1::DURABILITY_UNSPECIFIED:
+      return SessionDurability::kDefault;
+    case v1::DURABILITY_NONE:
+      return SessionDurability::kNone;
+    case v1::DURABILITY_ASYNC:
+      return SessionDurability::kAsync;
+    case v1::DURABILITY_SYNC:
+      return SessionDurability::kSync;
+    default:
+      return BadField("durability", "there is no such durability");
+  }
+}
 
 absl::StatusOr<SessionSettings> ToSettings(const v1::SessionSettings& message) {
   SessionSettings settings;

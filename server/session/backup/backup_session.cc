@@ -5,8 +5,21 @@
 #include "absl/types/optional.h"
 #include "core/mesh/error.h"
 #include "server/session/fingerprint.h"
+#include "server/session/session_errors.h"
 
 namespace dynmesh {
+namespace {
+
+const std::string& NameOf(const BackupIdentity& identity, const RestoreOptions& options) {
+  return options.name.empty() ? identity.name : options.name;
+}
+
+SessionDurability DurabilityOf(const BackupIdentity& identity, const RestoreOptions& options) {
+  const bool is_named = options.durability != SessionDurability::kDefault;
+  return is_named ? options.durability : identity.settings.durability;
+}
+
+}  // namespace
 
 absl::StatusOr<SessionBackup> BeginBackup(const Session& session, Lease& lease,
                                           absl::FunctionRef<void()> copied) {
@@ -28,14 +41,23 @@ absl::StatusOr<SessionBackup> BeginBackup(const Session& session, Lease& lease,
   return backup;
 }
 
+absl::Status CheckRestore(const SessionRegistry& registry, const BackupIdentity& identity,
+                          const RestoreOptions& options) {
+  if (!registry.keeps_sessions() && DurabilityOf(identity, options) != SessionDurability::kNone) {
+    return NoStore();
+  }
+  const bool may_be_retry = !options.request_id.empty() && !options.validate_only;
+  return may_be_retry ? absl::OkStatus() : registry.CheckCreation(NameOf(identity, options));
+}
+
 SessionSeed SeedOf(Backup backup, const RestoreOptions& options) {
-  SessionSeed seed{.name = options.name.empty() ? backup.identity.name : options.name,
-                   .settings = std::move(backup.identity.settings),
+  SessionSeed seed{.name = NameOf(backup.identity, options),
+                   .settings = backup.identity.settings,
                    .mesh = std::move(backup.mesh),
                    .commit_time = backup.identity.commit_time,
                    .request_id = options.request_id,
                    .validate_only = options.validate_only};
-  if (options.durability != SessionDurability::kDefault) seed.settings.durability = options.durability;
+  seed.settings.durability = DurabilityOf(backup.identity, options);
   Fingerprint fingerprint;
   fingerprint.AddString(options.name);
   fingerprint.AddNumber(static_cast<uint64_t>(options.durability));

@@ -35,6 +35,11 @@ struct RestoreOptions {
   bool validate_only = false;
 };
 
+/// OK unless it is clear already that CreateFrom will refuse it: the name is taken, or there is no store.
+/// What a retry may be is let through.
+absl::Status CheckRestore(const SessionRegistry& registry, const BackupIdentity& identity,
+                          const RestoreOptions& options);
+
 /// What SessionRegistry::CreateFrom makes a session of. A retry is one that has the same options and the same
 /// bytes.
 SessionSeed SeedOf(Backup backup, const RestoreOptions& options);
