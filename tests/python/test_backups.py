@@ -39,7 +39,7 @@ def assert_equal(copy, original):
 def test_a_session_is_made_again_and_goes_on_in_the_same_way(client, filled, tmp_path):
     path = tmp_path / "part.dynb"
     backup = filled.backup(path, progress=False)
-    assert backup.revision == 2 and backup.info == filled.info()
+    assert backup.revision == 2 and backup.info.to_dict() == filled.info().to_dict()
     assert backup.file_bytes == path.stat().st_size
     restored = client.restore_backup(path, "again", progress=False)
     copy = restored.session
