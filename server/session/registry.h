@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "absl/base/thread_annotations.h"
+#include "absl/container/flat_hash_set.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
@@ -75,7 +76,9 @@ class SessionRegistry {
   absl::StatusOr<SessionInfo> CreateFrom(SessionSeed seed);
 
   /// OK, or why no session of that name can be made now: errors of Create but for those of the store.
-  absl::Status CheckCreation(const std::string& name) const ABSL_LOCKS_EXCLUDED(mu_);
+  absl::Status CheckCreation(const std::string& name) const ABSL_LOCKS_EXCLUDED(mu_) {
+    return CheckRoom(name, 0);
+  }
 
   /// Calls Session::EnsureLoaded(). Errors: NOT_FOUND SESSION_NOT_FOUND.
   absl::StatusOr<SessionPtr> Find(absl::string_view name) const;
@@ -105,10 +108,20 @@ class SessionRegistry {
   const Workers& workers() const { return workers_; }
 
  private:
+  struct NewSession {
+    SessionPtr session;
+    SessionInfo info;  ///< of the beginning
+  };
+
   absl::Status Prepare(SessionSeed& seed) const;
   absl::StatusOr<SessionInfo> DescribeSeed(SessionSeed& seed) const;
-  absl::StatusOr<SessionInfo> CreateOnce(SessionSeed& seed) ABSL_EXCLUSIVE_LOCKS_REQUIRED(create_mu_);
-  absl::StatusOr<SessionPtr> MakeSession(SessionSeed& seed);
+  /// What the same request got before; null, and the name is taken until EndCreation(), if that is new.
+  absl::StatusOr<std::shared_ptr<const SessionInfo>> BeginCreation(const SessionSeed& seed)
+      ABSL_LOCKS_EXCLUDED(create_mu_);
+  void EndCreation(const SessionSeed& seed, const absl::StatusOr<NewSession>& made)
+      ABSL_LOCKS_EXCLUDED(create_mu_, mu_);
+  absl::Status CheckRoom(const std::string& name, size_t num_creating) const ABSL_LOCKS_EXCLUDED(mu_);
+  absl::StatusOr<NewSession> MakeSession(SessionSeed& seed);
   absl::StatusOr<std::unique_ptr<SessionLog>> MakeLog(const SessionSeed& seed,
                                                       const SessionIdentity& identity);
   absl::StatusOr<std::unique_ptr<SessionLog>> StoreSeed(const SessionSeed& seed,
@@ -124,7 +137,10 @@ class SessionRegistry {
   const std::shared_ptr<Budget> answer_budget_;
   const std::shared_ptr<Budget> backup_budget_;
   const std::shared_ptr<Budget> adaptation_budget_;
-  Mutex create_mu_;  ///< held while a session is created, which may wait for the disk
+  Mutex create_mu_;
+  CondVar created_one_;
+  /// Sessions that are being made, which may wait for the disk: others of the same name wait for them.
+  absl::flat_hash_set<std::string> creating_ ABSL_GUARDED_BY(create_mu_);
   mutable Mutex mu_;
   std::map<std::string, SessionPtr, std::less<>> sessions_ ABSL_GUARDED_BY(mu_);
   AnswerMemory<SessionInfo> created_ ABSL_GUARDED_BY(create_mu_);
