@@ -223,7 +223,10 @@ TEST(BackupDamageTest, PartsThatAreSwappedDoubledOrMissingAreFoundWhereTheyAre) 
 /// The parts of a backup, taken apart and sealed again: what an enemy would do.
 class Forgery {
  public:
-  explicit Forgery(const BackupIdentity& identity) { Append("DYNB\x01"), AddIdentity(identity); }
+  explicit Forgery(const BackupIdentity& identity) {
+    Append("DYNB\x01");
+    Add(BackupPart::kIdentity, EncodeBackupIdentity(identity));
+  }
 
   void Add(BackupPart part, absl::string_view content) { Add(part, 0, content.size(), content); }
   void Add(BackupPart part, uint8_t packing, uint64_t size, absl::string_view content) {
@@ -255,9 +258,6 @@ class Forgery {
   const std::string& bytes() const { return bytes_; }
 
  private:
-  void AddIdentity(const BackupIdentity& identity) {
-    Add(BackupPart::kIdentity, EncodeBackupIdentity(identity));
-  }
   void Append(absl::string_view bytes) {
     hash_.Add(bytes);
     bytes_.append(bytes.data(), bytes.size());
