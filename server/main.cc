@@ -90,11 +90,14 @@ ABSL_FLAG(uint64_t, max_query_steps, dynmesh::Limits().max_query_steps,
 ABSL_FLAG(uint64_t, max_answer_bytes, dynmesh::Limits().max_answer_bytes,
           "All answers of queries and exports that wait to be read");
 ABSL_FLAG(uint32_t, max_followers, dynmesh::Limits().max_followers, "Subscriptions of a session");
-ABSL_FLAG(uint32_t, max_concurrent_imports, dynmesh::Limits().max_concurrent_imports, "Imports at once");
+ABSL_FLAG(uint32_t, max_concurrent_imports, dynmesh::Limits().max_concurrent_imports,
+          "Imports and restores at once");
 ABSL_FLAG(uint32_t, max_concurrent_adaptations, dynmesh::Limits().max_concurrent_adaptations,
           "AdaptSession calls at once");
 ABSL_FLAG(uint64_t, max_staged_bytes, dynmesh::Limits().max_staged_bytes,
-          "What imports have received and not built yet, all together");
+          "What imports and restores have received and not finished yet, all together");
+ABSL_FLAG(uint64_t, max_backup_bytes, dynmesh::Limits().max_backup_bytes,
+          "Copies of sessions that backups are written of, all together");
 ABSL_FLAG(absl::Duration, import_idle_timeout, dynmesh::Limits().import_idle_timeout,
           "How long an import may send nothing, or not read what it is told");
 ABSL_FLAG(uint32_t, max_queued_tasks, dynmesh::Limits().max_queued_tasks,
@@ -162,6 +165,7 @@ Limits LimitsFromFlags() {
   limits.max_concurrent_adaptations = absl::GetFlag(FLAGS_max_concurrent_adaptations);
   limits.max_concurrent_imports = absl::GetFlag(FLAGS_max_concurrent_imports);
   limits.max_staged_bytes = absl::GetFlag(FLAGS_max_staged_bytes);
+  limits.max_backup_bytes = absl::GetFlag(FLAGS_max_backup_bytes);
   limits.import_idle_timeout = absl::GetFlag(FLAGS_import_idle_timeout);
   limits.max_queued_tasks = absl::GetFlag(FLAGS_max_queued_tasks);
   limits.max_queued_bytes = absl::GetFlag(FLAGS_max_queued_bytes);

@@ -21,6 +21,7 @@
 #include "grpcpp/server.h"
 #include "grpcpp/server_builder.h"
 #include "server/rpc/adapt_service.h"
+#include "server/rpc/backups_service.h"
 #include "server/rpc/checks_service.h"
 #include "server/rpc/edits_service.h"
 #include "server/rpc/history_service.h"
@@ -41,7 +42,8 @@ namespace {
 constexpr const char* kServiceNames[] = {"dynmesh.v1.SessionService", "dynmesh.v1.EditService",
                                          "dynmesh.v1.QueryService",   "dynmesh.v1.CheckService",
                                          "dynmesh.v1.RepairService",  "dynmesh.v1.AdaptService",
-                                         "dynmesh.v1.HistoryService", "dynmesh.v1.SubscriptionService"};
+                                         "dynmesh.v1.HistoryService", "dynmesh.v1.BackupService",
+                                         "dynmesh.v1.SubscriptionService"};
 // gRPC refuses larger messages before we see them; up to there our own refusal names the limit.
 constexpr uint64_t kHardMessageFactor = 4;
 // Followers, and a daemon that drains, wait for as long.
@@ -182,6 +184,7 @@ class Server::Impl {
     services_.push_back(MakeChecksService(context));
     services_.push_back(MakeSubscriptionsService(context));
     services_.push_back(MakeAdaptService(context));
+    services_.push_back(MakeBackupsService(context));
   }
 
   ~Impl() {

@@ -56,6 +56,8 @@ class Rebuilder {
   absl::Status AddRecord(const RecordView& record);
   /// Pages that are not as they were added, because of records: what the next checkpoint has to write.
   const DirtyPages& changed_pages() const { return changed_pages_; }
+  /// About what the mesh takes so far.
+  uint64_t memory_bytes() const { return memory_bytes_; }
   /// Of the head, or of the last record.
   int64_t revision() const { return mesh_.revision_; }
   absl::StatusOr<Mesh> Finish() &&;

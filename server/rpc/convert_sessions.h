@@ -15,6 +15,7 @@ namespace dynmesh {
 
 /// Errors: INVALID_ARGUMENT BAD_ARGUMENT.
 absl::StatusOr<SessionDurability> ToDurability(v1::Durability durability);
+/// Errors: INVALID_ARGUMENT BAD_ARGUMENT.
 absl::StatusOr<SessionSettings> ToSettings(const v1::SessionSettings& message);
 /// INVALID_ARGUMENT BAD_ARGUMENT unless the mask names fields that UpdateSession can change, and their values
 /// are good.

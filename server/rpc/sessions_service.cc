@@ -8,6 +8,7 @@
 #include "dynmesh/v1/sessions.grpc.pb.h"
 #include "server/rpc/call_stop.h"
 #include "server/rpc/chunk_stream.h"
+#include "server/rpc/convert.h"
 #include "server/rpc/convert_sessions.h"
 #include "server/rpc/import_reactor.h"
 #include "server/rpc/session_work.h"

@@ -40,12 +40,14 @@ struct Limits {
   uint64_t max_answer_bytes = uint64_t{2} << 30;
   /// Subscriptions of one session.
   uint32_t max_followers = 1000;
-  /// Imports that are receiving or building.
+  /// Imports and restores that are receiving or building.
   uint32_t max_concurrent_imports = 4;
   /// AdaptSession calls that are under way: each remembers what there is to do, up to 20 bytes an edge.
   uint32_t max_concurrent_adaptations = 4;
-  /// What imports have received and not built yet, all together.
+  /// What imports have received and not built yet, and restores have built and not finished, all together.
   uint64_t max_staged_bytes = DefaultMaxSessionBytes();
+  /// Copies of sessions that backups are written of, all together.
+  uint64_t max_backup_bytes = DefaultMaxSessionBytes();
   /// How long an import may send nothing, or leave unread what it is told.
   absl::Duration import_idle_timeout = absl::Seconds(60);
   /// Calls that wait for a thread or for their session, and the bytes of their requests; for each of the two

@@ -60,8 +60,41 @@ absl::StatusOr<SessionInfo> SessionRegistry::CreateFrom(SessionSeed seed) {
   DYNMESH_RETURN_IF_ERROR(CheckSessionName(seed.name));
   DYNMESH_RETURN_IF_ERROR(CheckRequestId(seed.request_id));
   DYNMESH_RETURN_IF_ERROR(Prepare(seed));
+  if (seed.validate_only) return DescribeSeed(seed);
+  DYNMESH_ASSIGN_OR_RETURN(const auto remembered, BeginCreation(seed));
+  if (remembered != nullptr) return *remembered;
+  const absl::StatusOr<NewSession> made = CatchExceptions([&] { return MakeSession(seed); });
+  EndCreation(seed, made);
+  if (!made.ok()) return made.status();
+  return made->info;
+}
+
+absl::StatusOr<std::shared_ptr<const SessionInfo>> SessionRegistry::BeginCreation(const SessionSeed& seed) {
   MutexLock lock(&create_mu_);
-  return CreateOnce(seed);
+  while (creating_.contains(seed.name)) created_one_.Wait(&create_mu_);
+  std::shared_ptr<const SessionInfo> remembered;
+  if (!seed.request_id.empty()) {
+    DYNMESH_ASSIGN_OR_RETURN(remembered, created_.Find(seed.request_id, seed.fingerprint));
+  }
+  if (remembered != nullptr) return remembered;
+  DYNMESH_RETURN_IF_ERROR(CheckRoom(seed.name, creating_.size()));
+  creating_.insert(seed.name);
+  return remembered;
+}
+
+void SessionRegistry::EndCreation(const SessionSeed& seed, const absl::StatusOr<NewSession>& made) {
+  MutexLock lock(&create_mu_);
+  creating_.erase(seed.name);
+  created_one_.NotifyAll();
+  if (!made.ok()) return;
+  if (!seed.request_id.empty()) {
+    created_.Remember(seed.request_id, seed.fingerprint, std::make_shared<const SessionInfo>(made->info),
+                      sizeof(made->info));
+  }
+  MutexLock sessions_lock(&mu_);
+  sessions_[seed.name] = {made->session};
+  spdlog::info("session_created name={} revision={} sessions={}", seed.name, made->info.revision,
+               sessions_.size());
 }
 
 /// Makes the mesh one of this daemon.
@@ -83,21 +116,16 @@ absl::Status SessionRegistry::Prepare(SessionSeed& seed) const {
   return absl::OkStatus();
 }
 
-absl::StatusOr<SessionInfo> SessionRegistry::CreateOnce(SessionSeed& seed) {
-  if (!seed.request_id.empty()) {
-    DYNMESH_ASSIGN_OR_RETURN(const auto remembered, created_.Find(seed.request_id, seed.fingerprint));
-    if (remembered != nullptr) return *remembered;
-  }
+absl::StatusOr<SessionInfo> SessionRegistry::DescribeSeed(SessionSeed& seed) const {
   DYNMESH_RETURN_IF_ERROR(CheckCreation(seed.name));
-  DYNMESH_ASSIGN_OR_RETURN(const SessionPtr session, MakeSession(seed));
+  if (seed.settings.durability != SessionDurability::kNone && store_ == nullptr) return NoStore();
+  Session::Options options{seed.name, seed.settings, limits_, workers_};
+  options.create_time = seed.create_time;
+  const auto session = std::make_shared<Session>(options);
+  session->BeginWith(std::move(seed.mesh), seed.commit_time);
   DYNMESH_ASSIGN_OR_RETURN(SessionInfo info, session->Info());
-  if (!seed.request_id.empty()) {
-    created_.Remember(seed.request_id, seed.fingerprint, std::make_shared<const SessionInfo>(info),
-                      sizeof(info));
-  }
-  MutexLock lock(&mu_);
-  sessions_[seed.name] = {session};
-  spdlog::info("session_created name={} revision={} sessions={}", seed.name, info.revision, sessions_.size());
+  info.uid.clear();
+  info.etag.clear();
   return info;
 }
 
@@ -108,18 +136,19 @@ absl::StatusOr<std::shared_ptr<const SessionInfo>> SessionRegistry::FindCreated(
   return created_.Find(request_id, fingerprint);
 }
 
-absl::Status SessionRegistry::CheckCreation(const std::string& name) const {
+absl::Status SessionRegistry::CheckRoom(const std::string& name, size_t num_creating) const {
   MutexLock lock(&mu_);
   if (draining_) return ShuttingDown();
   if (sessions_.count(name) > 0) {
     return MakeError(absl::StatusCode::kAlreadyExists, reason::kSessionExists,
                      absl::StrCat("there is a session ", name, " already"), {{"session", name}});
   }
-  if (sessions_.size() < limits_.max_sessions) return absl::OkStatus();
-  return LimitExceeded("max_sessions", limits_.max_sessions, sessions_.size() + 1);
+  const size_t wanted = sessions_.size() + num_creating + 1;
+  if (wanted <= limits_.max_sessions) return absl::OkStatus();
+  return LimitExceeded("max_sessions", limits_.max_sessions, wanted);
 }
 
-absl::StatusOr<SessionPtr> SessionRegistry::MakeSession(SessionSeed& seed) {
+absl::StatusOr<SessionRegistry::NewSession> SessionRegistry::MakeSession(SessionSeed& seed) {
   Session::Options options{seed.name, seed.settings, limits_, workers_};
   options.uid = Session::NewUid();
   options.create_time = seed.create_time;
@@ -132,7 +161,8 @@ absl::StatusOr<SessionPtr> SessionRegistry::MakeSession(SessionSeed& seed) {
   }
   auto session = std::make_shared<Session>(options, std::move(log));
   session->BeginWith(std::move(seed.mesh), seed.commit_time);
-  return session;
+  DYNMESH_ASSIGN_OR_RETURN(SessionInfo info, session->Info());
+  return NewSession{std::move(session), std::move(info)};
 }
 
 absl::StatusOr<std::unique_ptr<SessionLog>> SessionRegistry::MakeLog(const SessionSeed& seed,

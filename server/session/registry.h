@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "absl/base/thread_annotations.h"
+#include "absl/container/flat_hash_set.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
@@ -37,14 +38,15 @@ struct UnloadPolicy {
 /// A session that is to be made of a mesh.
 struct SessionSeed {
   std::string name;
-  SessionSettings settings = {};         ///< but `duplicates`, which is the mesh's
-  Mesh mesh;                             ///< of any revision, whatever relations it stores; no batch is open
+  SessionSettings settings = {};  ///< but `duplicates`, which is the mesh's
+  Mesh mesh;                      ///< of any revision, whatever relations it stores; no batch is open
   absl::Time commit_time = NowToTheMicrosecond();  ///< of mesh.revision()
   absl::Time create_time = NowToTheMicrosecond();
   RevisionNote note = {};
   // For retries: the fingerprint is of all that tells the request from others, the name too.
   std::string request_id = {};
   uint64_t fingerprint = 0;
+  bool validate_only = false;  ///< nothing is made; the answer, without uid and etag, is what would be
 };
 
 /// The sessions of a daemon by name.
@@ -67,6 +69,7 @@ class SessionRegistry {
         log_options_(log_options),
         import_gate_(limits),
         answer_budget_(std::make_shared<Budget>("max_answer_bytes", limits.max_answer_bytes)),
+        backup_budget_(std::make_shared<Budget>("max_backup_bytes", limits.max_backup_bytes)),
         adaptation_budget_(
             std::make_shared<Budget>("max_concurrent_adaptations", limits.max_concurrent_adaptations)) {}
 
@@ -97,7 +100,9 @@ class SessionRegistry {
       ABSL_LOCKS_EXCLUDED(create_mu_);
 
   /// OK, or why no session of that name can be made now: errors of Create but for those of the store.
-  absl::Status CheckCreation(const std::string& name) const ABSL_LOCKS_EXCLUDED(mu_);
+  absl::Status CheckCreation(const std::string& name) const ABSL_LOCKS_EXCLUDED(mu_) {
+    return CheckRoom(name, 0);
+  }
 
   /// Calls Session::EnsureLoaded(). Errors: NOT_FOUND SESSION_NOT_FOUND.
   absl::StatusOr<SessionPtr> Find(absl::string_view name);
@@ -127,6 +132,8 @@ class SessionRegistry {
   ImportGate& import_gate() { return import_gate_; }
   /// Of answers that are gathered and wait to be read (max_answer_bytes).
   const std::shared_ptr<Budget>& answer_budget() const { return answer_budget_; }
+  /// Of copies of sessions that backups are written of (max_backup_bytes).
+  const std::shared_ptr<Budget>& backup_budget() const { return backup_budget_; }
   /// Of adaptations that are under way: one each.
   const std::shared_ptr<Budget>& adaptation_budget() const { return adaptation_budget_; }
   const Limits& limits() const { return limits_; }
@@ -142,10 +149,20 @@ class SessionRegistry {
     uint64_t bytes;
     absl::Duration idle;
   };
+  struct NewSession {
+    SessionPtr session;
+    SessionInfo info;  ///< of the beginning
+  };
 
   absl::Status Prepare(SessionSeed& seed) const;
-  absl::StatusOr<SessionInfo> CreateOnce(SessionSeed& seed) ABSL_EXCLUSIVE_LOCKS_REQUIRED(create_mu_);
-  absl::StatusOr<SessionPtr> MakeSession(SessionSeed& seed);
+  absl::StatusOr<SessionInfo> DescribeSeed(SessionSeed& seed) const;
+  /// What the same request got before; null, and the name is taken until EndCreation(), if that is new.
+  absl::StatusOr<std::shared_ptr<const SessionInfo>> BeginCreation(const SessionSeed& seed)
+      ABSL_LOCKS_EXCLUDED(create_mu_);
+  void EndCreation(const SessionSeed& seed, const absl::StatusOr<NewSession>& made)
+      ABSL_LOCKS_EXCLUDED(create_mu_, mu_);
+  absl::Status CheckRoom(const std::string& name, size_t num_creating) const ABSL_LOCKS_EXCLUDED(mu_);
+  absl::StatusOr<NewSession> MakeSession(SessionSeed& seed);
   absl::StatusOr<std::unique_ptr<SessionLog>> MakeLog(const SessionSeed& seed,
                                                       const SessionIdentity& identity);
   absl::StatusOr<std::unique_ptr<SessionLog>> StoreSeed(const SessionSeed& seed,
@@ -167,8 +184,12 @@ class SessionRegistry {
   const SessionLogOptions log_options_;
   ImportGate import_gate_;
   const std::shared_ptr<Budget> answer_budget_;
+  const std::shared_ptr<Budget> backup_budget_;
   const std::shared_ptr<Budget> adaptation_budget_;
-  Mutex create_mu_;  ///< held while a session is created, which may wait for the disk
+  Mutex create_mu_;
+  CondVar created_one_;
+  /// Sessions that are being made, which may wait for the disk: others of the same name wait for them.
+  absl::flat_hash_set<std::string> creating_ ABSL_GUARDED_BY(create_mu_);
   mutable Mutex mu_;
   std::map<std::string, Entry, std::less<>> sessions_ ABSL_GUARDED_BY(mu_);
   AnswerMemory<SessionInfo> created_ ABSL_GUARDED_BY(create_mu_);

@@ -403,10 +403,6 @@ class Session : public std::enable_shared_from_this<Session> {
   absl::Status ChangeSettings(const SettingsUpdate& update, absl::string_view etag, const StopSignal& stop)
       ABSL_LOCKS_EXCLUDED(mu_, settings_mu_);
 
-  // session_unloading.cc
-  AnswerMemory<ImportOutcome> CopyImports() const ABSL_LOCKS_EXCLUDED(imports_mu_);
-  void KeepImports(AnswerMemory<ImportOutcome> imports) ABSL_LOCKS_EXCLUDED(imports_mu_);
-
   const Options options_;
   const std::string uid_;
   const absl::Time create_time_;

@@ -94,9 +94,10 @@ absl::Status SessionRecreated(absl::string_view name, absl::string_view expected
 }
 
 absl::Status ImportIdle(absl::Duration timeout) {
-  return MakeError(absl::StatusCode::kDeadlineExceeded, reason::kImportIdle,
-                   absl::StrCat("nothing of the import arrived for ", absl::FormatDuration(timeout)),
-                   {{"limit", "import_idle_timeout"}});
+  return MakeError(
+      absl::StatusCode::kDeadlineExceeded, reason::kImportIdle,
+      absl::StrCat("nothing of the import or restore arrived for ", absl::FormatDuration(timeout)),
+      {{"limit", "import_idle_timeout"}});
 }
 
 absl::Status SessionDamaged(absl::string_view name) {

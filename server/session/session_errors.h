@@ -58,7 +58,7 @@ absl::Status SessionDeleted(absl::string_view name);
 /// meant.
 absl::Status SessionRecreated(absl::string_view name, absl::string_view expected, absl::string_view actual);
 
-/// DEADLINE_EXCEEDED IMPORT_IDLE, metadata limit.
+/// DEADLINE_EXCEEDED IMPORT_IDLE, metadata limit: of an import or a restore.
 absl::Status ImportIdle(absl::Duration timeout);
 
 /// DATA_LOSS INTERNAL: an edit ended half way, so what the session holds is not to be trusted.

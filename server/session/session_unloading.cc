@@ -5,7 +5,6 @@
 #include <map>
 #include <utility>
 
-#include "server/session/importer/importer.h"
 #include "server/session/session.h"
 
 namespace dynmesh {
@@ -39,25 +38,12 @@ std::shared_ptr<Session> Session::Unload() {
   std::map<int, QuantizationGrid> grids = deltas_.grids();
   WriterMutexLock lock(&mu_);
   options.update_time = commit_time_;
-  AnswerMemory<ImportOutcome> imports = CopyImports();
   auto stored = std::make_shared<Session>(options, log_, Content::kStored);
-  stored->KeepImports(std::move(imports));
   stored->deltas_.KeepGrids(std::move(grids));
   // Until it is loaded it says how much work a query may be.
   for (size_t i = 0; i < num_live_.size(); ++i) stored->num_live_[i] = num_live_[i].load();
   log_->Rest();
   return stored;
-}
-
-// No record tells of imports, and there are few: they stay in memory.
-AnswerMemory<ImportOutcome> Session::CopyImports() const {
-  MutexLock lock(&imports_mu_);
-  return imports_;
-}
-
-void Session::KeepImports(AnswerMemory<ImportOutcome> imports) {
-  MutexLock lock(&imports_mu_);
-  imports_ = std::move(imports);
 }
 
 }  // namespace dynmesh

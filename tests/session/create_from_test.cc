@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <future>
 #include <memory>
 #include <utility>
 
@@ -206,6 +207,23 @@ TEST_F(CreateFromTest, FromThenOnTheLimitsAreThoseOfTheDaemon) {
   const SessionPtr session = *other.registry().Find("copy");
   MustApply(*session, {AddSomeVertices(5)});
   EXPECT_EQ(RefusalOf(session->Apply({AddSomeVertices(1)}, {})).code, absl::StatusCode::kResourceExhausted);
+}
+
+TEST_F(CreateFromTest, WhileOneWaitsForTheDiskOthersAreMadeAndThoseOfItsNameWait) {
+  MakeSource();
+  medium_.Hold();
+  auto first = std::async(std::launch::async, [&] {
+    return daemon_->registry().CreateFrom(SeedOf(*source_, SessionDurability::kSync)).status();
+  });
+  auto second = std::async(std::launch::async, [&] {
+    return daemon_->registry().CreateFrom(SeedOf(*source_, SessionDurability::kNone)).status();
+  });
+  daemon_->NewSession("other", {.durability = SessionDurability::kNone});
+  medium_.Release();
+  const absl::Status statuses[] = {first.get(), second.get()};
+  EXPECT_NE(statuses[0].ok(), statuses[1].ok());
+  const Refusal exists{absl::StatusCode::kAlreadyExists, reason::kSessionExists};
+  EXPECT_EQ(RefusalOf(statuses[0].ok() ? statuses[1] : statuses[0]), exists);
 }
 
 TEST_F(CreateFromTest, WithoutAStoreNoneIsDurable) {

@@ -4,7 +4,6 @@
 #include <utility>
 #include <vector>
 
-#include "core/codec/bytes.h"
 #include "core/mesh/error.h"
 #include "server/store/store_errors.h"
 
@@ -61,25 +60,35 @@ bool ReadChecks(ByteReader& in, CheckSettings& checks) {
 bool ReadRelations(ByteReader& in, std::vector<Relation>& relations) {
   for (uint64_t count = in.Varint(); count > 0 && in.ok(); --count) {
     const auto index = in.Fixed<uint8_t>();
-    if (index >= kNumStorableRelations) return false;
+    if (index >= kNumStorableRelations || relations.size() == kNumStorableRelations) return false;
     relations.push_back(kStorableRelations[index]);
   }
   return in.ok();
 }
 
+}  // namespace
+
+void WriteSettings(const SessionSettings& settings, ByteWriter& out) {
+  out.Fixed(static_cast<uint8_t>(settings.durability));
+  out.Fixed(static_cast<uint8_t>(settings.duplicates == DuplicatePolicy::kRefuse));
+  out.Varint(settings.stored_relations.size());
+  for (Relation relation : settings.stored_relations)
+    out.Fixed(static_cast<uint8_t>(StorableIndex(relation)));
+  WriteChecks(settings.checks, out);
+  WriteRetention(settings.retention, out);
+}
+
 bool ReadSettings(ByteReader& in, SessionSettings& settings) {
   const auto durability = in.Fixed<uint8_t>();
   const auto duplicates = in.Fixed<uint8_t>();
-  const bool known = durability == static_cast<uint8_t>(SessionDurability::kAsync) ||
-                     durability == static_cast<uint8_t>(SessionDurability::kSync);
+  const bool known = durability >= static_cast<uint8_t>(SessionDurability::kNone) &&
+                     durability <= static_cast<uint8_t>(SessionDurability::kSync);
   if (!known || duplicates > 1) return false;
   settings.durability = static_cast<SessionDurability>(durability);
   settings.duplicates = duplicates == 0 ? DuplicatePolicy::kKeep : DuplicatePolicy::kRefuse;
   return ReadRelations(in, settings.stored_relations) && ReadChecks(in, settings.checks) &&
          ReadRetention(in, settings.retention);
 }
-
-}  // namespace
 
 std::string EncodeManifest(const SessionManifest& manifest) {
   ByteWriter out;
@@ -103,7 +112,6 @@ absl::StatusOr<SessionManifest> DecodeManifest(absl::string_view bytes) {
 }
 
 std::string EncodeIdentity(const SessionIdentity& identity) {
-  const SessionSettings& settings = identity.settings;
   ByteWriter out;
   out.Varint(kManifestFormat);
   out.Text(identity.uid);
@@ -111,13 +119,7 @@ std::string EncodeIdentity(const SessionIdentity& identity) {
   out.Text(identity.request_id);
   out.Fixed(identity.fingerprint);
   out.Varint(static_cast<uint64_t>(identity.create_revision));
-  out.Fixed(static_cast<uint8_t>(settings.durability));
-  out.Fixed(static_cast<uint8_t>(settings.duplicates == DuplicatePolicy::kRefuse));
-  out.Varint(settings.stored_relations.size());
-  for (Relation relation : settings.stored_relations)
-    out.Fixed(static_cast<uint8_t>(StorableIndex(relation)));
-  WriteChecks(settings.checks, out);
-  WriteRetention(settings.retention, out);
+  WriteSettings(identity.settings, out);
   return std::move(out).Take();
 }
 
@@ -132,7 +134,8 @@ absl::StatusOr<SessionIdentity> DecodeIdentity(absl::string_view bytes) {
   identity.fingerprint = in.Fixed<uint64_t>();
   const uint64_t revision = in.Varint();
   identity.create_revision = static_cast<int64_t>(revision);
-  const bool sound = revision <= kMaxStamp && ReadSettings(in, identity.settings);
+  bool sound = revision <= kMaxStamp && ReadSettings(in, identity.settings);
+  sound &= identity.settings.durability != SessionDurability::kNone;  // those are in no store
   if (!sound || !in.done()) return StoreDamaged(kWhat);
   return identity;
 }

@@ -6,6 +6,7 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 #include "absl/time/time.h"
+#include "core/codec/bytes.h"
 #include "server/session/session_info.h"
 
 /// What a session's store holds beside records and pages. Formats of their own, sealed by the store.
@@ -18,6 +19,13 @@ struct SessionManifest {
   std::string head;
   int64_t newest = 0;  ///< some pages may be as late as that
 };
+
+/// Durability (u8), duplicates (u8), stored relations (their places in kStorableRelations), checks that are
+/// not as usual (name, severity, threshold), retention (revisions u32, age in us i64, bytes u64); texts and
+/// lists begin with their length (varint).
+void WriteSettings(const SessionSettings& settings, ByteWriter& out);
+/// False if the bytes are none, or of no durability that a session can have.
+bool ReadSettings(ByteReader& in, SessionSettings& settings);
 
 std::string EncodeManifest(const SessionManifest& manifest);
 /// Errors: FAILED_PRECONDITION STORE_FORMAT_NEWER; DATA_LOSS STORE_DAMAGED.
@@ -37,9 +45,7 @@ struct SessionIdentity {
 inline constexpr char kIdentityName[] = "identity";
 
 /// Format (varint, 1), uid, creation (int64, us since 1970), request id, fingerprint (u64), revision at which
-/// it began (varint), durability (u8), duplicates (u8), stored relations (their places in
-/// kStorableRelations), checks that are not as usual (name, severity, threshold), retention (revisions u32,
-/// age in us i64, bytes u64); texts and lists begin with their length (varint).
+/// it began (varint), settings; texts begin with their length (varint).
 std::string EncodeIdentity(const SessionIdentity& identity);
 /// Errors: as DecodeManifest.
 absl::StatusOr<SessionIdentity> DecodeIdentity(absl::string_view bytes);

@@ -15,13 +15,6 @@ namespace dynmesh {
 
 namespace {
 
-/// What was let in must come back: live meshes are measured before a batch, and the rebuilder estimates.
-uint64_t MaxBytes(const Limits& limits) {
-  constexpr uint64_t kSlack = uint64_t{1} << 30;
-  const uint64_t bytes = std::min(limits.max_session_bytes, std::numeric_limits<uint64_t>::max() / 4);
-  return 2 * bytes + kSlack;
-}
-
 /// A checkpoint that is being read again.
 struct Restart {
   Rebuilder rebuilder;
@@ -32,7 +25,7 @@ struct Restart {
 absl::StatusOr<Restart> ReadPages(SessionStore& store, const Checkpoint& checkpoint, const Limits& limits) {
   DYNMESH_ASSIGN_OR_RETURN(SessionManifest manifest, DecodeManifest(checkpoint.manifest));
   DYNMESH_ASSIGN_OR_RETURN(Rebuilder rebuilder,
-                           Rebuilder::Start(manifest.head, {.max_memory_bytes = MaxBytes(limits)}));
+                           Rebuilder::Start(manifest.head, {.max_memory_bytes = MaxRebuildBytes(limits)}));
   const auto add_page = [&](PageKey, absl::string_view bytes) { return rebuilder.AddPage(bytes); };
   DYNMESH_RETURN_IF_ERROR(store.ReadCheckpoint(checkpoint.number, add_page).status());
   return Restart{std::move(rebuilder), std::move(manifest)};
@@ -62,6 +55,12 @@ absl::StatusOr<Checkpoint> FindCheckpoint(SessionStore& store, uint64_t number) 
 }
 
 }  // namespace
+
+uint64_t MaxRebuildBytes(const Limits& limits) {
+  constexpr uint64_t kSlack = uint64_t{1} << 30;
+  const uint64_t bytes = std::min(limits.max_session_bytes, std::numeric_limits<uint64_t>::max() / 4);
+  return 2 * bytes + kSlack;
+}
 
 absl::StatusOr<RecoveredSession> RecoverSession(SessionStore& store, const Limits& limits) {
   RecoveredSession recovered;

@@ -31,6 +31,10 @@ struct RecoveredRevision {
   absl::Time commit_time;
 };
 
+/// What a rebuilder may take of memory: what was let in must come back. Live meshes are measured before a
+/// batch, and the rebuilder estimates.
+uint64_t MaxRebuildBytes(const Limits& limits);
+
 /// Reads a session from its last checkpoint and the records since.
 /// Errors: those of the store; FAILED_PRECONDITION STORE_FORMAT_NEWER, ARCHIVE_FORMAT_NEWER; DATA_LOSS
 /// STORE_DAMAGED, ARCHIVE_DAMAGED; RESOURCE_EXHAUSTED max_session_bytes. Cost: less than twice that of

@@ -12,6 +12,7 @@
 """
 
 from .adapt import AdaptProgress, AdaptResult, MeshShape
+from .backups import BackupResult, RestoreResult
 from .checks import (
     CHECKS,
     CheckReport,
@@ -71,6 +72,7 @@ __all__ = [
     "AlreadyExistsError",
     "Attribute",
     "AttributeSpec",
+    "BackupResult",
     "Block",
     "CancelledError",
     "CheckReport",
@@ -119,6 +121,7 @@ __all__ = [
     "RepairResult",
     "RepairStepResult",
     "ResourceExhaustedError",
+    "RestoreResult",
     "Session",
     "SessionInfo",
     "Snapshot",

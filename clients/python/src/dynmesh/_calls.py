@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 import grpc
 
 from .arguments import as_int64, as_seconds
-from .errors import DynmeshError, ResourceExhaustedError, UnavailableError, from_rpc_error
+from .errors import ResourceExhaustedError, UnavailableError, from_rpc_error
 
 Reply = TypeVar("Reply")
 
@@ -94,28 +94,41 @@ class Caller:
         self, method: Callable[..., Iterable[Reply]], request: Any, timeout: float | None
     ) -> Iterator[Reply]:
         """The replies of a streaming call; cancelled when the iterator is dropped early."""
-        oversize: list[DynmeshError] = []
+        broken: list[Exception] = []
         if hasattr(request, "ByteSize"):
             self.check_size(request)
         else:
-            request = self._checked(request, oversize)
+            request = self._checked(request, broken)
         call = method(request, timeout=_grpc_timeout(self._seconds(timeout)))
         try:
             yield from call
         except grpc.RpcError as error:
-            raise oversize[0] if oversize else from_rpc_error(error) from None
+            raise broken[0] if broken else from_rpc_error(error) from None
         finally:
             call.cancel()  # type: ignore[attr-defined]
 
-    def _checked(self, requests: Iterable[Any], refused: list[DynmeshError]) -> Iterator[Any]:
-        """`requests` up to one that is too large, which breaks the call; `refused` gets the error."""
-        for request in requests:
-            try:
+    def upload(self, method: Any, requests: Iterable[Any], timeout: float | None) -> Any:
+        """The reply to a stream of requests; cancelled when that is interrupted. Errors of `requests` pass through."""
+        broken: list[Exception] = []
+        call = method.future(self._checked(requests, broken), timeout=_grpc_timeout(self._seconds(timeout)))
+        try:
+            return call.result()
+        except (grpc.RpcError, grpc.FutureCancelledError) as error:
+            if broken:
+                raise broken[0] from None
+            raise from_rpc_error(call if isinstance(error, grpc.FutureCancelledError) else error) from None
+        finally:
+            call.cancel()
+
+    def _checked(self, requests: Iterable[Any], broken: list[Exception]) -> Iterator[Any]:
+        """`requests` up to one that is too large or cannot be made, which breaks the call; `broken` gets the error."""
+        try:
+            for request in requests:
                 self.check_size(request)
-            except DynmeshError as error:
-                refused.append(error)
-                raise
-            yield request
+                yield request
+        except Exception as error:
+            broken.append(error)
+            raise
 
     def _seconds(self, timeout: float | None) -> float:
         return self._timeout if timeout is None else as_seconds(timeout)

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from .cli_adapt import adapt, add_adapt
+from .cli_backup import add_backup_options, add_restore_options, backup, restore
 from .cli_check import CHECK_FAILED, CHECK_FOUND, add_check, add_settings, describe_report, run_check
 from .cli_edit import add_operators, describe_operators, operate, operator_record
 from .cli_parser import CommandParser, UsageError, positive
@@ -161,6 +162,8 @@ def _add_writing(commands: Any) -> None:
         step.add_argument("name", metavar="NAME")
         step.add_argument("count", metavar="N", nargs="?", type=positive, default=1, help="batches (1)")
         _add_if_revision(step)
+    help_text = "Make a session of a backup, at the revision that was backed up."
+    add_restore_options(_command(commands, "restore", _restore, help_text))
     remove = _command(commands, "rm", _rm, "Delete a session. Asks first when typed at a terminal.")
     remove.add_argument("name", metavar="NAME")
     remove.add_argument("--yes", action="store_true", help="do not ask")
@@ -196,6 +199,8 @@ def _add_reading(commands: Any) -> None:
         "file", metavar="FILE", help="its extension chooses meshio's format: .vtu holds everything"
     )
     export.add_argument("--no-slots", action="store_true", help="leave out the ids (dynmesh:slot)")
+    help_text = "Write a session to a file from which it can be restored, while it is edited."
+    add_backup_options(_command(commands, "backup", _backup, help_text))
     checking = _command(commands, "check", _check, "Check shapes and topology.")
     checking.set_defaults(exit_code_of_errors=CHECK_FAILED)
     add_check(checking)
@@ -325,6 +330,18 @@ def _export(args: argparse.Namespace) -> None:
         {"file": args.file, "revision": snapshot.revision, **counts},
         f"wrote {args.file} at revision {snapshot.revision}: {contents}",
     )
+
+
+def _backup(args: argparse.Namespace) -> None:
+    with _client(args) as client:
+        record, text = backup(client, args)
+    _print(args, record, text)
+
+
+def _restore(args: argparse.Namespace) -> None:
+    with _client(args) as client:
+        record, text = restore(client, args)
+    _print(args, record, text)
 
 
 def _ls(args: argparse.Namespace) -> None:

@@ -9,12 +9,16 @@ import grpc
 
 from ._calls import DEFAULT_MAX_MESSAGE_BYTES, Caller
 from .arguments import as_int64, as_request_id, as_text, as_word
+from .backups import RestoreResult, open_backup, read_restore, restore_requests
 from .checks import CheckSettings, checks_to_proto
 from .durability import durability_to_proto
+from .files import PathLike
 from .info import SessionInfo, info_from_proto
+from .progress import Progress
 from .relations import RelationLike, relations_to_proto
 from .session import Session
-from .v1 import sessions_pb2, sessions_pb2_grpc
+from .session_reader import FOREVER
+from .v1 import backups_pb2, backups_pb2_grpc, sessions_pb2, sessions_pb2_grpc
 
 DEFAULT_TARGET = "127.0.0.1:7447"
 DEFAULT_TIMEOUT_S = 60.0
@@ -48,6 +52,7 @@ class Client:
         self._caller = Caller(timeout, retries, max_message_bytes)
         self._channel = grpc.insecure_channel(target, options=options)
         self._sessions = sessions_pb2_grpc.SessionServiceStub(self._channel)
+        self._backups = backups_pb2_grpc.BackupServiceStub(self._channel)
 
     def __repr__(self) -> str:
         return f"<dynmesh.Client {self.target!r}>"
@@ -118,6 +123,59 @@ class Client:
         )
         self._caller.unary(self._sessions.CreateSession, request, timeout, repeatable=True)
         return made
+
+    def restore_backup(
+        self,
+        path: PathLike,
+        name: str | None = None,
+        *,
+        durability: str | None = None,
+        validate_only: bool = False,
+        request_id: str | None = None,
+        progress: bool | None = None,
+        timeout: float | None = None,
+    ) -> RestoreResult:
+        """Makes a session of a file that `Session.backup` wrote, on any daemon.
+
+        It begins at the revision that was backed up, with all ids and stamps. But it is another session than that
+        was: mirrors begin anew, and there is nothing to undo. Nobody sees it before it is whole.
+
+        Parameters
+        ----------
+        path : str or path
+        name : str, optional
+            Of the new session. Default: that of the one that was backed up.
+        durability : "none", "async" or "sync", optional
+            As in `create_session`. Default: that of the one that was backed up.
+        validate_only : bool
+            The backup is checked and the result computed, but no session is made.
+        request_id : str, optional
+            As in `create_session`.
+        timeout : float, optional
+            Default: none, as it takes as long as it takes.
+
+        Raises
+        ------
+        DataLossError
+            BACKUP_DAMAGED: ``metadata["byte"]`` is where in the file.
+        AlreadyExistsError
+            SESSION_EXISTS.
+        FailedPreconditionError
+            BACKUP_FORMAT_NEWER; NO_STORE: the daemon has no data directory.
+        OSError
+            The file cannot be read.
+        """
+        header = backups_pb2.RestoreHeader(
+            name="" if name is None else as_text(name, "name"),
+            durability=durability_to_proto(durability),
+            request_id=as_request_id(request_id),
+            validate_only=bool(validate_only),
+        )
+        seconds = FOREVER if timeout is None else timeout
+        with open_backup(path) as file, Progress("restoring", progress) as bar:
+            requests = restore_requests(header, file, bar)
+            reply = self._caller.upload(self._backups.RestoreBackup, requests, seconds)
+        return read_restore(self.session(reply.session.name), reply)
 
     def sessions(self, *, timeout: float | None = None) -> Iterator[SessionInfo]:
         """All sessions by name, fetched in pages; `timeout` is that of each page."""

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from ._calls import Caller
 from .arguments import INT32, as_count, as_int64, as_text, bad_argument
 from .arrays import Ids, Points
+from .backups import BackupResult, write_backup
 from .files import PathLike
 from .info import Counts, SessionInfo, info_from_proto
 from .kinds import KindLike, as_kind
@@ -30,7 +31,15 @@ from .queries import (
 )
 from .snapshot import Snapshot
 from .transfer import ExportReader
-from .v1 import queries_pb2, queries_pb2_grpc, sessions_pb2, sessions_pb2_grpc, types_pb2
+from .v1 import (
+    backups_pb2,
+    backups_pb2_grpc,
+    queries_pb2,
+    queries_pb2_grpc,
+    sessions_pb2,
+    sessions_pb2_grpc,
+    types_pb2,
+)
 
 if TYPE_CHECKING:
     import meshio
@@ -47,6 +56,7 @@ class SessionReader(PlaceReader):
         self._caller = caller
         self._sessions = sessions_pb2_grpc.SessionServiceStub(channel)
         self._queries = queries_pb2_grpc.QueryServiceStub(channel)
+        self._backups = backups_pb2_grpc.BackupServiceStub(channel)
 
     def info(self, *, timeout: float | None = None) -> SessionInfo:
         """What the session is and holds now."""
@@ -187,6 +197,32 @@ class SessionReader(PlaceReader):
         snapshot = self.snapshot(progress=progress, timeout=timeout)
         snapshot.write(path, file_format, slots=slots)
         return snapshot
+
+    def backup(
+        self, path: PathLike, *, progress: bool | None = None, timeout: float | None = None
+    ) -> BackupResult:
+        """Writes the session as it is now to a file, from which `Client.restore_backup` makes a session.
+
+        Others go on editing; the file holds one revision, to the last id and stamp, attributes and settings. A file
+        of that name is replaced when the backup is whole and on disk, and else stays as it is.
+
+        Parameters
+        ----------
+        path : str or path
+        timeout : float, optional
+            Default: none, as it takes as long as it takes.
+
+        Raises
+        ------
+        ResourceExhaustedError
+            LIMIT_EXCEEDED ``max_backup_bytes``: other backups have not been read yet.
+        OSError
+            The file cannot be written.
+        """
+        request = backups_pb2.BackupSessionRequest(session=self.name)
+        seconds = FOREVER if timeout is None else timeout
+        with Progress("backing up", progress) as bar:
+            return write_backup(self._caller.stream(self._backups.BackupSession, request, seconds), path, bar)
 
     def _selected(self, selection: types_pb2.Selection, as_of_revision: int) -> dict[str, Any]:
         return {"session": self.name, "selection": selection, "as_of_revision": as_int64(as_of_revision, "as_of_revision")}
