@@ -57,6 +57,8 @@ from .mirror_stats import MirrorStats
 from .places import Located, NearestVertices, RayHits
 from .queries import Csr, Entities, Surface
 from .repairs import RepairFinding, RepairResult, RepairStepResult
+from .retention import Retention
+from .revisions import RestoreResult, Revision, SnapshotInfo
 from .session import Session
 from .snapshot import Attribute, Block, Snapshot
 from .transfer import ImportResult
@@ -119,9 +121,13 @@ __all__ = [
     "RepairResult",
     "RepairStepResult",
     "ResourceExhaustedError",
+    "RestoreResult",
+    "Retention",
+    "Revision",
     "Session",
     "SessionInfo",
     "Snapshot",
+    "SnapshotInfo",
     "Surface",
     "SurfaceTopology",
     "Transaction",
