@@ -19,6 +19,7 @@ from .cli_adapt import adapt, add_adapt
 from .cli_check import CHECK_FAILED, CHECK_FOUND, add_check, add_settings, describe_report, run_check
 from .cli_edit import add_operators, describe_operators, operate, operator_record
 from .cli_history import add_history, add_retention_options, add_snapshots, retention_of
+from .cli_info import describe_info, info_row
 from .cli_notes import add_note_options
 from .cli_parser import CommandParser, UsageError, positive
 from .cli_query import add_questions
@@ -249,6 +250,8 @@ def _check_together(parser: argparse.ArgumentParser, args: argparse.Namespace) -
     """Refuses options that make no sense with others."""
     if getattr(args, "slot_map", None) and (args.file is None or args.slot_order != "hilbert"):
         parser.error("--slot-map tells the ids that FILE got with --slot-order hilbert: else item i gets id i")
+    if args.run is _create and args.message is not None and args.file is None:
+        parser.error("--message says why FILE is imported, and there is none")
     chosen = getattr(args, "relations", []) or getattr(args, "checks", [])
     if None in chosen and len(chosen) > 1:
         parser.error("none stands alone: it switches all relations to on demand, or all checks off")
@@ -367,7 +370,7 @@ def _ls(args: argparse.Namespace) -> None:
     with _client(args) as client:
         infos = list(client.sessions())
     lines = [f"{'NAME':24} {'REVISION':>9} {'VERTICES':>10} {'EDGES':>10} {'FACES':>10} {'CELLS':>10}"]
-    lines += [_row(info) for info in infos]
+    lines += [info_row(info) for info in infos]
     _print(args, [info.to_dict() for info in infos], "\n".join(lines))
 
 
@@ -453,7 +456,7 @@ def _print(args: argparse.Namespace, value: Any, text: str) -> None:
 def _print_import(args: argparse.Namespace, result: ImportResult) -> None:
     print_warnings(result.warnings)
     record = {**result.info.to_dict(), "warnings": warning_records(result.warnings)}
-    _print(args, record, _describe(result.info))
+    _print(args, record, describe_info(result.info))
 
 
 def _print_history(args: argparse.Namespace, did: str, result: HistoryResult) -> None:
@@ -463,47 +466,4 @@ def _print_history(args: argparse.Namespace, did: str, result: HistoryResult) ->
 
 
 def _print_info(args: argparse.Namespace, info: SessionInfo) -> None:
-    _print(args, info.to_dict(), _describe(info))
-
-
-def _row(info: SessionInfo) -> str:
-    if info.state != "loaded":
-        return f"{info.name:24} {info.revision:9} {info.state} {info.state_message}".rstrip()
-    counts = " ".join(f"{count:10}" for count in info.counts)
-    return f"{info.name:24} {info.revision:9} {counts}"
-
-
-def _describe(info: SessionInfo) -> str:
-    """An aligned listing for humans."""
-    lines = [f"{info.name} at revision {info.revision}, changed {info.update_time:%Y-%m-%d %H:%M:%S} UTC", ""]
-    lines.append(f"{'':10} {'vertices':>12} {'edges':>12} {'faces':>12} {'cells':>12}")
-    for title, counts in (
-        ("live", info.counts),
-        ("estimated", info.estimated_counts),
-        ("boundary", info.boundary_counts),
-        ("elements", info.element_counts),
-    ):
-        lines.append(f"{title:10} " + " ".join(f"{count:12}" for count in counts))
-    lines += ["", f"checksum   {info.checksum}", f"Euler      {info.euler_characteristic}"]
-    memory = f"memory     {info.memory_bytes / 2**20:.1f} MiB"
-    if info.index_bytes:
-        memory += f", and {info.index_bytes / 2**20:.1f} MiB of spatial indices"
-    if info.history_bytes:
-        memory += f", and {info.history_bytes / 2**20:.1f} MiB of history"
-    lines += [memory, f"durability {info.durability}, revision {info.durable_revision} is on disk"]
-    if info.durability == "none":
-        lines[-1] = "durability none: it ends with the daemon"
-    else:
-        lines.append(f"retention  {info.retention}")
-    lines.append(f"followers  {info.followers}")
-    lines.append(f"history    {info.undoable_batches} batches to undo, {info.redoable_batches} to redo")
-    if info.bounds is not None:
-        low, high = (" ".join(f"{x:g}" for x in corner) for corner in info.bounds)
-        lines.append(f"bounds     ({low}) to ({high})")
-    for (source, target), size in info.stored_relations.items():
-        lines.append(f"stored     {source}-{target}: {size / 2**20:.1f} MiB")
-    for name, (severity, threshold) in info.checks.items():
-        lines.append(f"check      {name}: {severity}, threshold {threshold:g}")
-    for spec in info.attributes:
-        lines.append(f"attribute  {spec.name}: {spec.dtype}[{spec.components}] of {spec.kind}, {spec.policy}")
-    return "\n".join(lines)
+    _print(args, info.to_dict(), describe_info(info))
