@@ -24,7 +24,9 @@ from setuptools.command.sdist import sdist
 HERE = Path(__file__).resolve().parent
 VENDOR = "vendor"
 ROOT = HERE / VENDOR if (HERE / VENDOR).is_dir() else HERE.parent.parent
-PROTOS = ("types", "sessions", "edits", "adapt", "backups", "queries", "checks", "repairs", "subscriptions")
+PROTOS = (
+    "types", "sessions", "edits", "history", "adapt", "backups", "queries", "checks", "repairs", "subscriptions"
+)
 CORE = ("core/mesh", "core/delta", "core/codec")
 STAGE = Path("build/native")
 LIBRARIES = (

@@ -6,8 +6,8 @@
 
 namespace dynmesh {
 
-absl::StatusOr<RestoreOptions> ToRestoreOptions(const v1::RestoreHeader& header) {
-  RestoreOptions options{.name = header.name(), .validate_only = header.validate_only()};
+absl::StatusOr<BackupRestoreOptions> ToRestoreOptions(const v1::RestoreHeader& header) {
+  BackupRestoreOptions options{.name = header.name(), .validate_only = header.validate_only()};
   if (!options.name.empty()) DYNMESH_RETURN_IF_ERROR(CheckSessionName(options.name));
   DYNMESH_ASSIGN_OR_RETURN(options.durability, ToDurability(header.durability()));
   DYNMESH_RETURN_IF_ERROR(CheckRequestId(header.request_id()));

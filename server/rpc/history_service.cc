@@ -10,6 +10,7 @@
 #include "server/rpc/convert_sessions.h"
 #include "server/rpc/unary.h"
 #include "server/session/fork.h"
+#include "server/session/revisions.h"
 #include "server/session/session_errors.h"
 
 namespace dynmesh {
@@ -29,12 +30,13 @@ absl::Status Answer(Session& session, const v1::ListRevisionsRequest& request,
   return absl::OkStatus();
 }
 
-/// The revision that a request means; 0: none.
+/// The revision that a request means.
 template <typename Request>
-absl::StatusOr<int64_t> TargetOf(Session& session, const Request& request, int64_t revision) {
+absl::StatusOr<int64_t> TargetOf(Session& session, const Request& request, absl::optional<int64_t> revision) {
   if (request.has_snapshot()) return FindSnapshotRevision(session, request.snapshot());
-  if (revision < 0) return BadField("revision", "the revision is negative");
-  return revision;
+  if (!revision.has_value()) return kLastRevision;
+  if (*revision < 0) return BadField("revision", "the revision is negative");
+  return *revision;
 }
 
 absl::Status Answer(Session& session, const v1::RestoreSessionRequest& request, const StopSignal& stop,
@@ -60,7 +62,9 @@ absl::Status Answer(const ServiceContext& services, Session& source, const v1::F
   options.note = ToNote(request.note());
   DYNMESH_ASSIGN_OR_RETURN(options.durability, ToDurability(request.durability()));
   DYNMESH_RETURN_IF_ERROR(AwaitLoaded(source));
-  DYNMESH_ASSIGN_OR_RETURN(options.revision, TargetOf(source, request, request.source_revision()));
+  absl::optional<int64_t> revision;
+  if (request.has_source_revision()) revision = request.source_revision();
+  DYNMESH_ASSIGN_OR_RETURN(options.revision, TargetOf(source, request, revision));
   DYNMESH_ASSIGN_OR_RETURN(const SessionInfo info, Fork(services.registry, source, options));
   *response->mutable_session() = FromSessionInfo(info);
   response->set_revision(info.revision);

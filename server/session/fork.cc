@@ -4,7 +4,6 @@
 
 #include "core/mesh/error.h"
 #include "server/session/fingerprint.h"
-#include "server/session/revisions.h"
 
 namespace dynmesh {
 namespace {

@@ -7,6 +7,7 @@
 #include "absl/status/statusor.h"
 #include "server/session/durability/revision_note.h"
 #include "server/session/registry.h"
+#include "server/session/revisions.h"
 #include "server/session/session.h"
 
 namespace dynmesh {
@@ -15,7 +16,7 @@ namespace dynmesh {
 struct ForkOptions {
   std::string name = {};
   std::string request_id = {};
-  int64_t revision = 0;                                        ///< of the source; 0: the last one
+  int64_t revision = kLastRevision;                            ///< of the source
   SessionDurability durability = SessionDurability::kDefault;  ///< kDefault: that of the source
   RevisionNote note = {};
 };

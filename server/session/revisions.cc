@@ -66,7 +66,7 @@ absl::StatusOr<RevisionList> ListRevisions(Session& session, int64_t before, siz
 absl::StatusOr<RecoveredRevision> MeshAt(Session& session, int64_t revision) {
   absl::optional<RecoveredRevision> current;
   DYNMESH_RETURN_IF_ERROR(session.Read([&](const SessionView& view) {
-    const bool is_last = revision == 0 || revision == view.mesh.revision();
+    const bool is_last = revision == kLastRevision || revision == view.mesh.revision();
     if (is_last) current = RecoveredRevision{view.mesh.Clone(), view.commit_time};
     return absl::OkStatus();
   }));

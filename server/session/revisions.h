@@ -44,7 +44,10 @@ struct RevisionList {
 /// origin tells of. Errors: NO_HISTORY; those of the store.
 absl::StatusOr<RevisionList> ListRevisions(Session& session, int64_t before, size_t max_count);
 
-/// What the session was at `revision` (0: at the last one).
+/// The last revision, whichever that is; 0 is the one that a session is created with.
+inline constexpr int64_t kLastRevision = -1;
+
+/// What the session was at `revision` (kLastRevision will do).
 /// Errors: OUT_OF_RANGE REVISION_GONE, REVISION_IN_FUTURE; NO_HISTORY, but for the last one;
 /// RESOURCE_EXHAUSTED; those of the store. Cost: that of loading the session; of the last revision: of a
 /// copy.

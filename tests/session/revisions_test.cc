@@ -34,7 +34,7 @@ class RevisionsTest : public ::testing::Test {
     return session;
   }
 
-  static Mesh Copy(Session& session) { return std::move(MeshAt(session, 0)->mesh); }
+  static Mesh Copy(Session& session) { return std::move(MeshAt(session, kLastRevision)->mesh); }
 
   static void MakeCheckpoint(Session& session) {
     const absl::Status written =
@@ -64,7 +64,9 @@ class RevisionsTest : public ::testing::Test {
 };
 
 TEST_F(RevisionsTest, EachRevisionCanBeHadToTheLastStampAlsoAfterARestart) {
-  EditAtRandom(*daemon_->NewSession(), 60);
+  const SessionPtr made = daemon_->NewSession();
+  copies_.emplace(0, Copy(*made));  // the beginning is a revision like others
+  EditAtRandom(*made, 60);
   for (int restarts = 0; restarts < 2; ++restarts) {
     const SessionPtr session = Find();
     for (const auto& [revision, copy] : copies_) {
@@ -73,7 +75,7 @@ TEST_F(RevisionsTest, EachRevisionCanBeHadToTheLastStampAlsoAfterARestart) {
       ASSERT_TRUE(then.ok()) << then.status();
       ExpectIdentical(then->mesh, copy);
     }
-    EXPECT_EQ(MeshAt(*session, 0)->mesh.revision(), session->revision());
+    EXPECT_EQ(MeshAt(*session, kLastRevision)->mesh.revision(), session->revision());
     EXPECT_EQ(RefusalOf(MeshAt(*session, session->revision() + 1)),
               (Refusal{absl::StatusCode::kOutOfRange, reason::kRevisionInFuture}));
     Restart();
@@ -304,7 +306,8 @@ TEST_F(RevisionsTest, ASessionThatIsNotKeptHasNoPast) {
   const Refusal refusal{absl::StatusCode::kFailedPrecondition, reason::kNoHistory};
   EXPECT_EQ(RefusalOf(ListRevisions(*session, 0, 10)), refusal);
   EXPECT_EQ(RefusalOf(CreateSnapshot(*session, "a", 0, {})), refusal);
-  EXPECT_EQ(RefusalOf(MeshAt(*session, 0)), (Refusal{absl::StatusCode::kOk, ""})) << "but a present";
+  EXPECT_EQ(RefusalOf(MeshAt(*session, kLastRevision)), (Refusal{absl::StatusCode::kOk, ""}))
+      << "but a present";
   MustApply(*session, {AddVerticesEdit{{{0, 0, 1}}}});
   EXPECT_EQ(RefusalOf(MeshAt(*session, 1)), refusal);
 }

@@ -12,7 +12,7 @@
 """
 
 from .adapt import AdaptProgress, AdaptResult, MeshShape
-from .backups import BackupResult, RestoreResult
+from .backups import BackupResult, RestoredBackup
 from .checks import (
     CHECKS,
     CheckReport,
@@ -58,6 +58,8 @@ from .mirror_stats import MirrorStats
 from .places import Located, NearestVertices, RayHits
 from .queries import Csr, Entities, Surface
 from .repairs import RepairFinding, RepairResult, RepairStepResult
+from .retention import Retention
+from .revisions import RestoreResult, Revision, SnapshotInfo
 from .session import Session
 from .snapshot import Attribute, Block, Snapshot
 from .transfer import ImportResult
@@ -122,9 +124,13 @@ __all__ = [
     "RepairStepResult",
     "ResourceExhaustedError",
     "RestoreResult",
+    "RestoredBackup",
+    "Retention",
+    "Revision",
     "Session",
     "SessionInfo",
     "Snapshot",
+    "SnapshotInfo",
     "Surface",
     "SurfaceTopology",
     "Transaction",

@@ -9,8 +9,9 @@ from typing import Any, TypeVar
 
 import grpc
 
-from .arguments import as_int64, as_seconds
-from .errors import ResourceExhaustedError, UnavailableError, from_rpc_error
+from .arguments import as_int64, as_seconds, as_text
+from .errors import DynmeshError, ResourceExhaustedError, UnavailableError, from_rpc_error
+from .v1 import types_pb2
 
 Reply = TypeVar("Reply")
 
@@ -51,12 +52,28 @@ class Caller:
         How often a call that may be repeated is repeated when nobody answers.
     max_message_bytes : int
         The server's limit of that name.
+    author : str, optional
+        Who makes revisions, where a call does not say otherwise.
     """
 
-    def __init__(self, timeout: float, retries: int, max_message_bytes: int = DEFAULT_MAX_MESSAGE_BYTES) -> None:
+    def __init__(
+        self,
+        timeout: float,
+        retries: int,
+        max_message_bytes: int = DEFAULT_MAX_MESSAGE_BYTES,
+        author: str | None = None,
+    ) -> None:
         self._timeout = as_seconds(timeout)
         self._retries = as_int64(retries, "retries", 0)
         self._max_message_bytes = as_int64(max_message_bytes, "max_message_bytes", 1)
+        self._author = "" if author is None else as_text(author, "author")
+
+    def note(self, author: str | None, message: str | None) -> types_pb2.RevisionNote:
+        """What is said of a revision; without an author it is the client's."""
+        return types_pb2.RevisionNote(
+            author=self._author if author is None else as_text(author, "author"),
+            message="" if message is None else as_text(message, "message"),
+        )
 
     def check_size(self, request: Any) -> None:
         """Refuses a message that gRPC would refuse at the other end without saying why.

@@ -23,10 +23,14 @@ def bad_argument(what: str, message: str) -> InvalidArgumentError:
 
 
 def as_text(value: str, what: str) -> str:
-    """`value`, if it is a string."""
-    if isinstance(value, str):
-        return value
-    raise bad_argument(what, f"{what} is no string: {value!r}")
+    """`value`, if it is a string that UTF-8 can write: a command line may hold others."""
+    if not isinstance(value, str):
+        raise bad_argument(what, f"{what} is no string: {value!r}")
+    try:
+        value.encode()
+    except UnicodeEncodeError:
+        raise bad_argument(what, f"{what} is no text: {value!r}") from None
+    return value
 
 
 def as_request_id(value: str | None) -> str:

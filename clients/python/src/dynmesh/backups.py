@@ -44,7 +44,7 @@ class BackupResult:
 
 
 @dataclass(frozen=True)
-class RestoreResult:
+class RestoredBackup:
     """What was made of a backup.
 
     Attributes
@@ -103,9 +103,9 @@ def restore_requests(
         bar.set("restoring", file.tell(), size)
 
 
-def read_restore(session: Session, reply: backups_pb2.RestoreBackupResponse) -> RestoreResult:
+def read_restore(session: Session, reply: backups_pb2.RestoreBackupResponse) -> RestoredBackup:
     """What the daemon answered; `session` is the new one."""
-    return RestoreResult(session, info_from_proto(reply.session), reply.source_name, reply.source_uid)
+    return RestoredBackup(session, info_from_proto(reply.session), reply.source_name, reply.source_uid)
 
 
 def _write_replies(

@@ -19,6 +19,9 @@ from .cli_adapt import adapt, add_adapt
 from .cli_backup import add_backup_options, add_restore_options, backup, restore
 from .cli_check import CHECK_FAILED, CHECK_FOUND, add_check, add_settings, describe_report, run_check
 from .cli_edit import add_operators, describe_operators, operate, operator_record
+from .cli_history import add_history, add_retention_options, add_snapshots, retention_of
+from .cli_info import describe_info, info_row
+from .cli_notes import add_note_options
 from .cli_parser import CommandParser, UsageError, positive
 from .cli_query import add_questions
 from .cli_repair import add_repair_options, describe_repair, repair, repair_record
@@ -76,6 +79,7 @@ def make_parser() -> argparse.ArgumentParser:
     _add_writing(commands)
     _add_reading(commands)
     _add_query(commands)
+    _add_history(commands)
     return parser
 
 
@@ -130,6 +134,7 @@ def _add_writing(commands: Any) -> None:
         choices=DURABILITY_NAMES,
         help="what acknowledges an edit: nothing, a write, the disk (sync, if the daemon has a data directory)",
     )
+    add_retention_options(create)
     _add_import_options(create)
     fill = _command(commands, "import", _import, "Fill an empty session from a mesh file.")
     fill.add_argument("name", metavar="NAME")
@@ -152,16 +157,22 @@ def _add_writing(commands: Any) -> None:
         help="cell-edge, vertex-cell, edge-cell, vertex-face, cell-cell, vertex-vertex; or none",
     )
     add_settings(_command(commands, "set-checks", _set_checks, "Make just these checks on each batch from now on."))
+    help_text = "Keep just these earlier revisions from now on, besides snapshots. Without options: as the daemon says."
+    retain = _command(commands, "set-retention", _set_retention, help_text)
+    retain.add_argument("name", metavar="NAME")
+    add_retention_options(retain)
     help_text = "Repair a session, as one revision: the steps in the order in which they are listed."
     mend = _command(commands, "repair", _repair, help_text)
     mend.add_argument("name", metavar="NAME")
     add_repair_options(mend)
     _add_if_revision(mend)
+    add_note_options(mend)
     for name, text in (("undo", "Take the last batches of edits back."), ("redo", "Do undone batches again.")):
         step = _command(commands, name, _undo if name == "undo" else _redo, text)
         step.add_argument("name", metavar="NAME")
         step.add_argument("count", metavar="N", nargs="?", type=positive, default=1, help="batches (1)")
         _add_if_revision(step)
+        add_note_options(step)
     help_text = "Make a session of a backup, at the revision that was backed up."
     add_restore_options(_command(commands, "restore", _restore, help_text))
     remove = _command(commands, "rm", _rm, "Delete a session. Asks first when typed at a terminal.")
@@ -187,6 +198,7 @@ def _add_import_options(parser: argparse.ArgumentParser) -> None:
         metavar="FILE.npz",
         help="where to write the ids that --slot-order hilbert gave: an array for each kind, by position in the file",
     )
+    add_note_options(parser)
 
 
 def _add_reading(commands: Any) -> None:
@@ -218,7 +230,16 @@ def _add_query(commands: Any) -> None:
     questions = commands.add_parser("query", help=help_text, description=help_text).add_subparsers(
         metavar="QUESTION", required=True
     )
-    add_questions(lambda name, text: _command(questions, name, _query, text))
+    add_questions(lambda name, text: _command(questions, name, _ask, text))
+
+
+def _add_history(commands: Any) -> None:
+    add_history(lambda name, text: _command(commands, name, _ask, text))
+    help_text = "Name revisions, which are kept then."
+    snapshots = commands.add_parser("snapshot", help=help_text, description=help_text).add_subparsers(
+        metavar="ACTION", required=True
+    )
+    add_snapshots(lambda name, text: _command(snapshots, name, _ask, text))
 
 
 # ---- Commands ----
@@ -234,6 +255,8 @@ def _check_together(parser: argparse.ArgumentParser, args: argparse.Namespace) -
     """Refuses options that make no sense with others."""
     if getattr(args, "slot_map", None) and (args.file is None or args.slot_order != "hilbert"):
         parser.error("--slot-map tells the ids that FILE got with --slot-order hilbert: else item i gets id i")
+    if args.run is _create and args.message is not None and args.file is None:
+        parser.error("--message says why FILE is imported, and there is none")
     chosen = getattr(args, "relations", []) or getattr(args, "checks", [])
     if None in chosen and len(chosen) > 1:
         parser.error("none stands alone: it switches all relations to on demand, or all checks off")
@@ -244,13 +267,18 @@ def _check_together(parser: argparse.ArgumentParser, args: argparse.Namespace) -
         parser.error("--ends names edges, which --faces and --kind do not")
     if getattr(args, "kind", None) and getattr(args, "at", None) is not None:
         parser.error("--at is a place on an edge, and --kind names elements")
+    if getattr(args, "needs_target", False) and (args.revision is None) == (args.snapshot is None):
+        parser.error("say what to go back to: either REVISION or --snapshot SNAPSHOT")
 
 
 def _create(args: argparse.Namespace) -> None:
     mesh = read_mesh(args.file) if args.file else None  # first: a file that cannot be read makes no session
     with _client(args) as client:
         session = client.create_session(
-            args.name, duplicates=args.duplicates, durability=args.durability
+            args.name,
+            duplicates=args.duplicates,
+            durability=args.durability,
+            retention=retention_of(args),
         )
         if mesh is None:
             return _print_info(args, session.info())
@@ -269,7 +297,9 @@ def _import(args: argparse.Namespace) -> None:
 
 
 def _import_mesh(args: argparse.Namespace, session: Session, mesh: Any) -> ImportResult:
-    result = session.import_mesh(mesh, attributes=args.attributes, slot_order=args.slot_order)
+    result = session.import_mesh(
+        mesh, attributes=args.attributes, slot_order=args.slot_order, message=args.message
+    )
     if args.slot_map:
         with open(args.slot_map, "wb") as file:  # np.savez would change the name
             np.savez(file, **{str(kind): ids for kind, ids in result.slots.items()})
@@ -301,16 +331,25 @@ def _set_checks(args: argparse.Namespace) -> None:
         _print_info(args, client.session(args.name).set_checks(wanted))
 
 
+def _set_retention(args: argparse.Namespace) -> None:
+    with _client(args) as client:
+        _print_info(args, client.session(args.name).set_retention(retention_of(args)))
+
+
 def _undo(args: argparse.Namespace) -> None:
     with _client(args) as client:
-        result = client.session(args.name).undo(args.count, if_revision=args.if_revision)
+        result = client.session(args.name).undo(args.count, **_step_options(args))
     _print_history(args, "undid", result)
 
 
 def _redo(args: argparse.Namespace) -> None:
     with _client(args) as client:
-        result = client.session(args.name).redo(args.count, if_revision=args.if_revision)
+        result = client.session(args.name).redo(args.count, **_step_options(args))
     _print_history(args, "redid", result)
+
+
+def _step_options(args: argparse.Namespace) -> dict[str, Any]:
+    return {"if_revision": args.if_revision, "message": args.message}
 
 
 def _adapt(args: argparse.Namespace) -> None:
@@ -348,7 +387,7 @@ def _ls(args: argparse.Namespace) -> None:
     with _client(args) as client:
         infos = list(client.sessions())
     lines = [f"{'NAME':24} {'REVISION':>9} {'VERTICES':>10} {'EDGES':>10} {'FACES':>10} {'CELLS':>10}"]
-    lines += [_row(info) for info in infos]
+    lines += [info_row(info) for info in infos]
     _print(args, [info.to_dict() for info in infos], "\n".join(lines))
 
 
@@ -371,7 +410,7 @@ def _check(args: argparse.Namespace) -> int:
     return CHECK_FOUND if failed else 0
 
 
-def _query(args: argparse.Namespace) -> None:
+def _ask(args: argparse.Namespace) -> None:
     with _client(args) as client:
         record, text = args.ask(client.session(args.name), args)
     _print(args, record, text)
@@ -391,7 +430,7 @@ def _rm(args: argparse.Namespace) -> int | None:
 
 
 def _client(args: argparse.Namespace) -> Client:
-    return connect(args.target, timeout=args.timeout)
+    return connect(args.target, timeout=args.timeout, author=getattr(args, "author", None))
 
 
 def _confirmed(question: str) -> bool:
@@ -434,7 +473,7 @@ def _print(args: argparse.Namespace, value: Any, text: str) -> None:
 def _print_import(args: argparse.Namespace, result: ImportResult) -> None:
     print_warnings(result.warnings)
     record = {**result.info.to_dict(), "warnings": warning_records(result.warnings)}
-    _print(args, record, _describe(result.info))
+    _print(args, record, describe_info(result.info))
 
 
 def _print_history(args: argparse.Namespace, did: str, result: HistoryResult) -> None:
@@ -444,45 +483,4 @@ def _print_history(args: argparse.Namespace, did: str, result: HistoryResult) ->
 
 
 def _print_info(args: argparse.Namespace, info: SessionInfo) -> None:
-    _print(args, info.to_dict(), _describe(info))
-
-
-def _row(info: SessionInfo) -> str:
-    if info.state != "loaded":
-        return f"{info.name:24} {info.revision:9} {info.state} {info.state_message}".rstrip()
-    counts = " ".join(f"{count:10}" for count in info.counts)
-    return f"{info.name:24} {info.revision:9} {counts}"
-
-
-def _describe(info: SessionInfo) -> str:
-    """An aligned listing for humans."""
-    lines = [f"{info.name} at revision {info.revision}, changed {info.update_time:%Y-%m-%d %H:%M:%S} UTC", ""]
-    lines.append(f"{'':10} {'vertices':>12} {'edges':>12} {'faces':>12} {'cells':>12}")
-    for title, counts in (
-        ("live", info.counts),
-        ("estimated", info.estimated_counts),
-        ("boundary", info.boundary_counts),
-        ("elements", info.element_counts),
-    ):
-        lines.append(f"{title:10} " + " ".join(f"{count:12}" for count in counts))
-    lines += ["", f"checksum   {info.checksum}", f"Euler      {info.euler_characteristic}"]
-    memory = f"memory     {info.memory_bytes / 2**20:.1f} MiB"
-    if info.index_bytes:
-        memory += f", and {info.index_bytes / 2**20:.1f} MiB of spatial indices"
-    if info.history_bytes:
-        memory += f", and {info.history_bytes / 2**20:.1f} MiB of history"
-    lines += [memory, f"durability {info.durability}, revision {info.durable_revision} is on disk"]
-    if info.durability == "none":
-        lines[-1] = "durability none: it ends with the daemon"
-    lines.append(f"followers  {info.followers}")
-    lines.append(f"history    {info.undoable_batches} batches to undo, {info.redoable_batches} to redo")
-    if info.bounds is not None:
-        low, high = (" ".join(f"{x:g}" for x in corner) for corner in info.bounds)
-        lines.append(f"bounds     ({low}) to ({high})")
-    for (source, target), size in info.stored_relations.items():
-        lines.append(f"stored     {source}-{target}: {size / 2**20:.1f} MiB")
-    for name, (severity, threshold) in info.checks.items():
-        lines.append(f"check      {name}: {severity}, threshold {threshold:g}")
-    for spec in info.attributes:
-        lines.append(f"attribute  {spec.name}: {spec.dtype}[{spec.components}] of {spec.kind}, {spec.policy}")
-    return "\n".join(lines)
+    _print(args, info.to_dict(), describe_info(info))

@@ -8,6 +8,7 @@ from dataclasses import asdict
 from typing import Any
 
 from .adapt import AdaptResult, MeshShape
+from .cli_notes import add_note_options
 from .session import Session
 
 
@@ -24,6 +25,7 @@ def add_adapt(make: Callable[[str, str], argparse.ArgumentParser]) -> None:
     )
     parser.add_argument("--max-passes", metavar="N", type=int, default=10, help="(10)")
     parser.add_argument("--max-elements", metavar="N", type=int, help="split no further from there on")
+    add_note_options(parser)
 
 
 def adapt(session: Session, args: argparse.Namespace) -> tuple[dict[str, Any], str]:
@@ -35,6 +37,7 @@ def adapt(session: Session, args: argparse.Namespace) -> tuple[dict[str, Any], s
         feature_angle=args.feature_angle,
         max_passes=args.max_passes,
         max_elements=args.max_elements,
+        message=args.message,
     )
     return asdict(result), _describe(result)
 

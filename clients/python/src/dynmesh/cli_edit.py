@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from .arrays import Ids
+from .cli_notes import add_note_options
 from .cli_warnings import warning_records
 from .edit_result import EditResult
 from .session import Session
@@ -58,7 +59,10 @@ def add_operators(add: AddCommand) -> None:
 def operate(session: Session, args: argparse.Namespace) -> EditResult:
     """Carries out a command."""
     tx = session.edit(
-        if_revision=args.if_revision, validate_only=args.dry_run, skip_refused=args.skip_refused
+        if_revision=args.if_revision,
+        validate_only=args.dry_run,
+        skip_refused=args.skip_refused,
+        message=args.message,
     )
     with tx:
         args.operate(session, tx, args)
@@ -77,6 +81,7 @@ def _add_places(
     parser.add_argument("--skip-refused", action="store_true", help="pass over what the mesh refuses, and say why")
     parser.add_argument("--if-revision", metavar="R", type=int, help="only if the session is at this revision")
     parser.add_argument("--dry-run", action="store_true", help="tell what would be done, and do nothing")
+    add_note_options(parser)
 
 
 def _limits(args: argparse.Namespace) -> dict[str, Any]:
@@ -124,6 +129,7 @@ def operator_record(result: EditResult) -> dict[str, Any]:
     """The result for programs."""
     return {
         "revision": result.revision,
+        "durable_revision": result.durable_revision,
         "counts": result.counts._asdict(),
         "new_vertices": [None if id_ == _NO_VERTEX else id_ for id_ in result.new_vertices.tolist()],
         "moved": sum(result.num_moved),

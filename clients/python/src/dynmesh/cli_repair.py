@@ -43,7 +43,10 @@ def repair(session: Session, args: argparse.Namespace) -> RepairResult:
         fill_holes=args.fill_holes,
     )
     return session.repair(
-        [_with_isolated(step, args) for step in steps], if_revision=args.if_revision, validate_only=args.dry_run
+        [_with_isolated(step, args) for step in steps],
+        if_revision=args.if_revision,
+        validate_only=args.dry_run,
+        message=args.message,
     )
 
 
@@ -59,7 +62,12 @@ def repair_record(result: RepairResult) -> dict[str, Any]:
         }
         for step in result.steps
     ]
-    return {"revision": result.revision, "counts": result.counts._asdict(), "steps": steps}
+    return {
+        "revision": result.revision,
+        "durable_revision": result.durable_revision,
+        "counts": result.counts._asdict(),
+        "steps": steps,
+    }
 
 
 def describe_repair(result: RepairResult, args: argparse.Namespace) -> str:

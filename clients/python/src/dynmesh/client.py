@@ -9,13 +9,14 @@ import grpc
 
 from ._calls import DEFAULT_MAX_MESSAGE_BYTES, Caller
 from .arguments import as_int64, as_request_id, as_text, as_word
-from .backups import RestoreResult, open_backup, read_restore, restore_requests
+from .backups import RestoredBackup, open_backup, read_restore, restore_requests
 from .checks import CheckSettings, checks_to_proto
 from .durability import durability_to_proto
 from .files import PathLike
 from .info import SessionInfo, info_from_proto
 from .progress import Progress
 from .relations import RelationLike, relations_to_proto
+from .retention import Retention, retention_to_proto
 from .session import Session
 from .session_reader import FOREVER
 from .v1 import backups_pb2, backups_pb2_grpc, sessions_pb2, sessions_pb2_grpc
@@ -44,12 +45,10 @@ class Client:
     Thread safety: everything may be called from any thread.
     """
 
-    def __init__(
-        self, target: str, timeout: float, retries: int, max_message_bytes: int, read_ahead_bytes: int | None
-    ) -> None:
+    def __init__(self, target: str, caller: Caller, read_ahead_bytes: int | None) -> None:
         self.target = as_text(target, "target")
         options = (*_CHANNEL_OPTIONS, *_window_options(read_ahead_bytes))
-        self._caller = Caller(timeout, retries, max_message_bytes)
+        self._caller = caller
         self._channel = grpc.insecure_channel(target, options=options)
         self._sessions = sessions_pb2_grpc.SessionServiceStub(self._channel)
         self._backups = backups_pb2_grpc.BackupServiceStub(self._channel)
@@ -81,6 +80,7 @@ class Client:
         durability: str | None = None,
         stored_relations: Iterable[RelationLike] = (),
         checks: CheckSettings = MappingProxyType({}),
+        retention: Retention | None = None,
         request_id: str | None = None,
         timeout: float | None = None,
     ) -> Session:
@@ -100,6 +100,8 @@ class Client:
             Relations to keep as tables: as in `Session.store_relations`.
         checks : mapping of str to severity, or to (severity, threshold)
             Made on each batch of edits: as in `Session.set_checks`.
+        retention : Retention, optional
+            Which earlier revisions stay: as in `Session.set_retention`. Default: what the daemon says.
         request_id : str, optional
             A retry with the same id gets the first answer. Default: a new one.
 
@@ -115,6 +117,7 @@ class Client:
             durability=durability_to_proto(durability),
             stored_relations=relations_to_proto(stored_relations),
             checks=checks_to_proto(checks),
+            retention=None if retention is None else retention_to_proto(retention),
         )
         request = sessions_pb2.CreateSessionRequest(
             name=name,
@@ -134,7 +137,7 @@ class Client:
         request_id: str | None = None,
         progress: bool | None = None,
         timeout: float | None = None,
-    ) -> RestoreResult:
+    ) -> RestoredBackup:
         """Makes a session of a file that `Session.backup` wrote, on any daemon.
 
         It begins at the revision that was backed up, with all ids and stamps. But it is another session than that
@@ -200,6 +203,7 @@ def connect(
     retries: int = 2,
     max_message_bytes: int = DEFAULT_MAX_MESSAGE_BYTES,
     read_ahead_bytes: int | None = None,
+    author: str | None = None,
 ) -> Client:
     """Attaches to a daemon. Returns at once: the first call finds out whether one is there.
 
@@ -218,8 +222,11 @@ def connect(
         How much of each answer the server may send ahead of what has been read, 64 KiB at least. By default as
         much as keeps the line busy, up to some megabytes; what a slow mirror has not read yet is that much out
         of date. Over a line that is both fast and far, a small number makes answers slow.
+    author : str, optional
+        Who makes the revisions of this client, at most 256 bytes: `Session.revisions` tells it again, and nobody
+        checks it. Default: nobody is named.
     """
-    return Client(target, timeout, retries, max_message_bytes, read_ahead_bytes)
+    return Client(target, Caller(timeout, retries, max_message_bytes, author), read_ahead_bytes)
 
 
 def _window_options(read_ahead_bytes: int | None) -> tuple[tuple[str, int], ...]:

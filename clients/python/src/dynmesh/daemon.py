@@ -35,9 +35,12 @@ class Daemon:
         All addresses on which it serves.
     """
 
-    def __init__(self, process: subprocess.Popen[bytes], directory: Path, grace_s: float) -> None:
+    def __init__(
+        self, process: subprocess.Popen[bytes], directory: Path, grace_s: float, author: str | None = None
+    ) -> None:
         self._process = process
         self._directory = directory
+        self._author = author
         self._client: Client | None = None
         self.target = f"unix:{directory / 'socket'}"
         self.addresses: tuple[str, ...] = ()
@@ -70,14 +73,16 @@ class Daemon:
         retries: int = 2,
         max_message_bytes: int = DEFAULT_MAX_MESSAGE_BYTES,
         read_ahead_bytes: int | None = None,
+        author: str | None = None,
     ) -> Client:
-        """Another client of this daemon: as `dynmesh.connect`."""
+        """Another client of this daemon: as `dynmesh.connect`; without an author that of `launch`."""
         return connect(
             self.target,
             timeout=timeout,
             retries=retries,
             max_message_bytes=max_message_bytes,
             read_ahead_bytes=read_ahead_bytes,
+            author=self._author if author is None else author,
         )
 
     def log_tail(self, lines: int = _LOG_TAIL_LINES) -> str:
@@ -123,6 +128,10 @@ def launch(
     data_dir: PathLike | None = None,
     idle_timeout: float | None = None,
     max_loaded_bytes: int | None = None,
+    retain_revisions: int | None = None,
+    retain_age: float | None = None,
+    retain_bytes: int | None = None,
+    author: str | None = None,
     flags: Sequence[str] = (),
     timeout: float = 30.0,
     grace: float = 10.0,
@@ -147,6 +156,15 @@ def launch(
     max_loaded_bytes : int, optional
         Memory of the sessions in `data_dir` that are loaded: beyond it the least recently used ones are unloaded.
         0 and default: however much.
+    retain_revisions : int, optional
+        Last revisions of a session in `data_dir` that can be gone back to (`Session.restore`), unless the session
+        says otherwise (`Session.set_retention`). 0: all. Default: the daemon's own, 4096.
+    retain_age : float, optional
+        The same by their age in seconds. 0 and default: of any age.
+    retain_bytes : int, optional
+        The same by the disk that their records take. 0: however much. Default: the daemon's own, 256 MiB.
+    author : str, optional
+        Who makes the revisions of this daemon's clients: as in `dynmesh.connect`.
     flags : sequence of str
         Further flags of dynmeshd.
     timeout : float
@@ -171,9 +189,12 @@ def launch(
         *([] if data_dir is None else [f"--data_dir={Path(data_dir).absolute()}"]),
         *([] if idle_timeout is None else [f"--idle_timeout={idle_timeout:.9f}s"]),
         *([] if max_loaded_bytes is None else [f"--max_loaded_bytes={max_loaded_bytes:d}"]),
+        *([] if retain_revisions is None else [f"--retain_revisions={retain_revisions:d}"]),
+        *([] if retain_age is None else [f"--retain_age={retain_age:f}s"]),
+        *([] if retain_bytes is None else [f"--retain_bytes={retain_bytes:d}"]),
         *flags,
     ]
-    daemon = Daemon(_start(arguments, directory), directory, grace)
+    daemon = Daemon(_start(arguments, directory), directory, grace, author)
     try:
         daemon._wait_until_ready(ready_file, timeout)
     except BaseException:

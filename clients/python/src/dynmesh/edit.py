@@ -372,6 +372,7 @@ class EditBatch:
             refusals=tuple(tuple(map(refusal_from_proto, result.refusals)) for result in reply.results),
             lineage=tuple(map(lineage_from_proto, reply.results)),
             num_moved=tuple(result.num_moved for result in reply.results),
+            durable_revision=reply.durable_revision,
         )
 
     def _append_vertices(self, count: int, **kind: Any) -> Ids:

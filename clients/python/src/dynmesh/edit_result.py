@@ -79,6 +79,8 @@ class EditResult:
         For each edit which elements it made of which, with ``report_lineage``.
     num_moved : tuple of int
         For each edit how many vertices `smooth_vertices` moved.
+    durable_revision : int
+        The last revision that is on disk; without durability the last one. With "async" it may be an earlier one.
     batch_number : int
         Tells the batch's handles from those of others.
     """
@@ -94,6 +96,7 @@ class EditResult:
     refusals: tuple[tuple[Refusal, ...], ...] = ()
     lineage: tuple[Lineage, ...] = ()
     num_moved: tuple[int, ...] = ()
+    durable_revision: int = 0
 
     def resolve(self, vertices: ArrayLike) -> Ids:
         """Vertex ids for handles that `EditBatch.add_vertices` gave out; ids stay as they are.
@@ -131,6 +134,8 @@ class HistoryResult:
         Of the session then; of ``validate_only`` what they would be.
     undoable_batches, redoable_batches : int
         What can be undone and redone then; of ``validate_only`` before.
+    durable_revision : int
+        As in `EditResult`.
     """
 
     revision: int
@@ -139,6 +144,7 @@ class HistoryResult:
     counts: Counts
     undoable_batches: int
     redoable_batches: int
+    durable_revision: int
 
     def to_dict(self) -> dict[str, Any]:
         """The same in the types of JSON; the checksum is a hexadecimal string."""
@@ -154,6 +160,7 @@ def history_from_proto(reply: edits_pb2.UndoEditsResponse | edits_pb2.RedoEditsR
         counts=counts_from_proto(reply.counts),
         undoable_batches=reply.undoable_batches,
         redoable_batches=reply.redoable_batches,
+        durable_revision=reply.durable_revision,
     )
 
 

@@ -36,7 +36,7 @@ class EditStream:
     def __init__(
         self,
         method: Callable[..., Any],
-        make_request: Callable[[EditBatch], edits_pb2.ApplyEditsRequest],
+        make_request: Callable[[EditBatch, str | None], edits_pb2.ApplyEditsRequest],
         window: int,
         check_size: Callable[[Any], None],
     ) -> None:
@@ -61,14 +61,15 @@ class EditStream:
             self._call.cancel()
         self.close()
 
-    def submit(self, batch: EditBatch) -> Future[EditResult]:
+    def submit(self, batch: EditBatch, *, message: str | None = None) -> Future[EditResult]:
         """Sends a batch; its future holds the result or the error. Waits while the window is full.
 
+        `message` says why, in place of the stream's.
         Raises `ResourceExhaustedError` LIMIT_EXCEEDED for a batch so large that it would end the stream.
         """
         future: Future[EditResult] = Future()
         future.set_running_or_notify_cancel()  # sent is sent
-        request = edits_pb2.StreamEditsRequest(batch=self._make_request(as_batch(batch)))
+        request = edits_pb2.StreamEditsRequest(batch=self._make_request(as_batch(batch), message))
         self._check_size(request)
         self._room.acquire()
         with self._lock:

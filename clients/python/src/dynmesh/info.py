@@ -16,6 +16,7 @@ from .checksum import Checksum
 from .durability import durability_name, state_name
 from .kinds import EntityKind
 from .relations import Relation, relation_from_proto
+from .retention import Retention, retention_from_proto
 from .v1 import sessions_pb2, types_pb2
 
 
@@ -113,6 +114,8 @@ class SessionInfo:
         Relations that are kept as tables, and the bytes of each, which are part of `memory_bytes`.
     checks : dict of str to CheckSetting
         Checks that are made on each batch: `Session.set_checks`.
+    retention : Retention
+        Which earlier revisions stay: `Session.set_retention`. Of no effect without durability.
     bounds : float64[2, 3] or None
         Smallest and largest coordinates; None without vertices.
     """
@@ -143,6 +146,7 @@ class SessionInfo:
     attributes: tuple[AttributeSpec, ...]
     stored_relations: dict[Relation, int]
     checks: dict[str, CheckSetting]
+    retention: Retention
     bounds: Points | None
 
     def to_dict(self) -> dict[str, Any]:
@@ -176,6 +180,7 @@ class SessionInfo:
                 f"{source}-{target}": size for (source, target), size in self.stored_relations.items()
             },
             "checks": {name: setting._asdict() for name, setting in self.checks.items()},
+            "retention": self.retention._asdict(),
             "bounds": None if self.bounds is None else self.bounds.tolist(),
         }
 
@@ -238,6 +243,7 @@ def info_from_proto(message: sessions_pb2.Session) -> SessionInfo:
             for stored in message.stored_relations
         },
         checks=checks_from_proto(message.settings.checks),
+        retention=retention_from_proto(message.settings.retention),
         bounds=_bounds(message),
     )
 

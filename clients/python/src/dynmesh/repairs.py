@@ -167,12 +167,15 @@ class RepairResult:
     steps : tuple of RepairStepResult
     checksum, counts
         Of the session then.
+    durable_revision : int
+        The last one that is on disk; without durability the last one.
     """
 
     revision: int
     steps: tuple[RepairStepResult, ...]
     checksum: Checksum
     counts: Counts
+    durable_revision: int
 
     def count(self, finding: str) -> int:
         """How often `finding` was found by all steps together."""
@@ -229,7 +232,11 @@ def _result_from_proto(message: repairs_pb2.RepairResult, steps: list[RepairStep
         for step, result in zip(steps, message.steps, strict=True)
     )
     return RepairResult(
-        message.revision, results, checksum_from_proto(message.checksum), counts_from_proto(message.counts)
+        revision=message.revision,
+        steps=results,
+        checksum=checksum_from_proto(message.checksum),
+        counts=counts_from_proto(message.counts),
+        durable_revision=message.durable_revision,
     )
 
 

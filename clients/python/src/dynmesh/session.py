@@ -33,7 +33,7 @@ from .mirror import Mirror, Update
 from .mirror_state import MirrorState
 from .progress import Progress
 from .relations import RelationLike, relations_to_proto
-from .session_changes import SessionChanges
+from .session_history import SessionHistory
 from .session_reader import FOREVER
 from .transfer import ImportResult, import_requests, read_import
 from .v1 import edits_pb2, sessions_pb2, subscriptions_pb2, subscriptions_pb2_grpc
@@ -56,7 +56,7 @@ _CODECS = {
 }
 
 
-class Session(SessionChanges):
+class Session(SessionHistory):
     """A session by its name; made by `Client.session` and `Client.create_session`.
 
     Costs nothing to make and holds nothing of the mesh: each method is a call. ``timeout`` is in seconds;
@@ -127,6 +127,8 @@ class Session(SessionChanges):
         attributes: Collection[str] | None = None,
         slot_order: str = "caller",
         validate_only: bool = False,
+        author: str | None = None,
+        message: str | None = None,
         progress: bool | None = None,
         timeout: float | None = None,
     ) -> ImportResult:
@@ -149,6 +151,8 @@ class Session(SessionChanges):
             `ImportResult.slots` tells the ids.
         validate_only : bool
             Everything is checked and the result computed, but the session stays empty.
+        author, message
+            As in `edit`.
         timeout : float, optional
             Default: none, as it takes as long as it takes.
 
@@ -168,6 +172,7 @@ class Session(SessionChanges):
             validate_only=bool(validate_only),
             request_id=as_request_id(None),
             slot_order=order,
+            note=self._caller.note(author, message),
         )
         requests = import_requests(header, data)
         with Progress("importing", progress) as bar:
@@ -188,6 +193,8 @@ class Session(SessionChanges):
         skip_refused: bool = False,
         report_lineage: bool = False,
         conflict_policy: str = "ignore",
+        author: str | None = None,
+        message: str | None = None,
         timeout: float | None = None,
     ) -> Transaction:
         """A batch of edits, sent as one revision when its ``with`` block ends without an exception.
@@ -219,6 +226,10 @@ class Session(SessionChanges):
             own batches count as others, too: go on with the revision of the last one. An edge named by its ends
             that is gone is `NotFoundError` UNKNOWN_ENTITY all the same.
             With ``skip_refused``, items of operators that conflict are passed over.
+        author : str, optional
+            Who makes the revision, at most 256 bytes; nobody checks that. Default: that of the client.
+        message : str, optional
+            Why, at most 4096 bytes. `revisions` tells both again, of sessions that are kept on disk.
         """
         options = {
             "as_of_revision": as_of_revision,
@@ -228,6 +239,8 @@ class Session(SessionChanges):
             "skip_refused": skip_refused,
             "report_lineage": report_lineage,
             "conflict_policy": conflict_policy,
+            "author": author,
+            "message": message,
         }
         return Transaction(lambda batch: self.apply(batch, timeout=timeout, **options))  # type: ignore[arg-type]
 
@@ -242,6 +255,8 @@ class Session(SessionChanges):
         skip_refused: bool = False,
         report_lineage: bool = False,
         conflict_policy: str = "ignore",
+        author: str | None = None,
+        message: str | None = None,
         timeout: float | None = None,
     ) -> EditResult:
         """Sends a batch that was collected without a ``with`` block. Parameters as in `edit`."""
@@ -255,6 +270,7 @@ class Session(SessionChanges):
             skip_refused=bool(skip_refused),
             report_lineage=bool(report_lineage),
             conflict_policy=_conflict_policy(conflict_policy),
+            note=self._caller.note(author, message),
         )
         return batch.read(self._caller.unary(self._edits.ApplyEdits, request, timeout, repeatable=True))
 
@@ -265,13 +281,19 @@ class Session(SessionChanges):
         skip_refused: bool = False,
         report_lineage: bool = False,
         conflict_policy: str = "ignore",
+        author: str | None = None,
+        message: str | None = None,
         window: int = 64,
     ) -> EditStream:
-        """Pipelined edits: up to `window` batches are on their way at once. Other parameters as in `edit`."""
+        """Pipelined edits: up to `window` batches are on their way at once. Other parameters as in `edit`.
+
+        `message` is that of batches which `EditStream.submit` gives no other.
+        """
         read_at = as_int64(as_of_revision, "as_of_revision")
         policy = _conflict_policy(conflict_policy)
+        note = self._caller.note(author, message)
 
-        def make_request(batch: EditBatch) -> edits_pb2.ApplyEditsRequest:
+        def make_request(batch: EditBatch, said: str | None) -> edits_pb2.ApplyEditsRequest:
             return edits_pb2.ApplyEditsRequest(
                 session=self.name,
                 edits=batch.edits(),
@@ -280,6 +302,7 @@ class Session(SessionChanges):
                 skip_refused=bool(skip_refused),
                 report_lineage=bool(report_lineage),
                 conflict_policy=policy,
+                note=note if said is None else self._caller.note(author, said),
             )
 
         return EditStream(self._edits.StreamEdits, make_request, window, self._caller.check_size)

@@ -39,6 +39,8 @@ class SessionChanges(SessionChecks):
         if_revision: int | None = None,
         request_id: str | None = None,
         validate_only: bool = False,
+        author: str | None = None,
+        message: str | None = None,
         progress: bool | None = None,
         timeout: float | None = None,
     ) -> RepairResult:
@@ -55,7 +57,7 @@ class SessionChanges(SessionChecks):
         fill_holes : int, optional
             Instead of `steps`: those that are named, with their defaults, in this order, and `orient` once more
             after holes were filled, as surfaces that are closed can be made to face outwards.
-        if_revision, request_id, validate_only
+        if_revision, request_id, validate_only, author, message
             As in `edit`.
         timeout : float, optional
             Default: none, as it takes as long as it takes.
@@ -79,6 +81,7 @@ class SessionChanges(SessionChecks):
             if_revision=as_revision(if_revision),
             request_id=as_request_id(request_id),
             validate_only=bool(validate_only),
+            note=self._caller.note(author, message),
         )
         seconds = FOREVER if timeout is None else timeout
         with Progress("repairing", progress) as bar:
@@ -91,6 +94,8 @@ class SessionChanges(SessionChecks):
         if_revision: int | None = None,
         request_id: str | None = None,
         validate_only: bool = False,
+        author: str | None = None,
+        message: str | None = None,
         timeout: float | None = None,
     ) -> HistoryResult:
         """Takes the last `count` batches back, whoever sent them, all or nothing, as one new revision.
@@ -102,7 +107,7 @@ class SessionChanges(SessionChecks):
 
         Parameters
         ----------
-        if_revision, request_id, validate_only
+        if_revision, request_id, validate_only, author, message
             As in `edit`. ``if_revision`` makes sure that nobody's batch came last but the one that is meant. With
             ``validate_only`` the result has the checksum and counts that would be, and the revision and the batches
             that can be undone and redone of before.
@@ -112,7 +117,10 @@ class SessionChanges(SessionChecks):
         FailedPreconditionError
             NOTHING_TO_UNDO: there are fewer than `count`. Nothing is undone then.
         """
-        request = edits_pb2.UndoEditsRequest(**self._history_fields(count, if_revision, request_id, validate_only))
+        request = edits_pb2.UndoEditsRequest(
+            **self._history_fields(count, if_revision, request_id, validate_only),
+            note=self._caller.note(author, message),
+        )
         return self._move(self._edits.UndoEdits, request, timeout)
 
     def redo(
@@ -122,13 +130,18 @@ class SessionChanges(SessionChecks):
         if_revision: int | None = None,
         request_id: str | None = None,
         validate_only: bool = False,
+        author: str | None = None,
+        message: str | None = None,
         timeout: float | None = None,
     ) -> HistoryResult:
         """Does again the `count` batches that `undo` took back last, as one new revision.
 
         A new batch ends it. Parameters as in `undo`; `FailedPreconditionError` NOTHING_TO_REDO.
         """
-        request = edits_pb2.RedoEditsRequest(**self._history_fields(count, if_revision, request_id, validate_only))
+        request = edits_pb2.RedoEditsRequest(
+            **self._history_fields(count, if_revision, request_id, validate_only),
+            note=self._caller.note(author, message),
+        )
         return self._move(self._edits.RedoEdits, request, timeout)
 
     def _move(self, method: Any, request: Any, timeout: float | None) -> HistoryResult:
@@ -154,6 +167,8 @@ class SessionChanges(SessionChecks):
         feature_angle: float = 40.0,
         max_passes: int = 10,
         max_elements: int | None = None,
+        author: str | None = None,
+        message: str | None = None,
         progress: bool | Callable[[AdaptProgress], None] | None = None,
         timeout: float | None = None,
     ) -> AdaptResult:
@@ -179,6 +194,8 @@ class SessionChanges(SessionChecks):
         max_passes : int
         max_elements : int, optional
             No more splits when there are so many.
+        author, message
+            As in `edit`: of each revision that is made.
         progress : bool or callable, optional
             Whether to show a bar (default: on a terminal); or what is called with each `AdaptProgress`.
         timeout : float, optional
@@ -194,6 +211,7 @@ class SessionChanges(SessionChecks):
         request = adapt_request(
             self.name, target_length, size_attribute, min_quality, feature_angle, max_passes, max_elements
         )
+        request.note.CopyFrom(self._caller.note(author, message))
         listen = progress if callable(progress) else None
         with Progress("adapting", False if callable(progress) else progress) as bar:
             replies = self._caller.stream(
