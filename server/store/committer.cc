@@ -4,6 +4,7 @@
 #include <new>
 #include <utility>
 
+#include "core/mesh/error.h"
 #include "server/store/store_errors.h"
 
 namespace dynmesh {
@@ -22,29 +23,34 @@ size_t MoveFirst(std::deque<Committer::Write>& from, size_t min_bytes, std::vect
 
 }  // namespace
 
-Committer::Committer(Engine* engine, const CommitterOptions& options)
-    : engine_(engine), options_(options), thread_([this] { Run(); }) {}
+Committer::Committer(Engine* engine, const CommitterOptions& options) : engine_(engine), options_(options) {
+  for (std::thread& thread : threads_) thread = std::thread([this] { Run(); });
+}
 
 Committer::~Committer() {
   {
     MutexLock lock(&mu_);
     stopping_ = true;
-    news_.NotifyOne();
+    news_.NotifyAll();
   }
-  thread_.join();
+  for (std::thread& thread : threads_) thread.join();
 }
 
 void Committer::Enqueue(Write write) {
-  MutexLock lock(&mu_);
-  foreground_.push_back(std::move(write));
-  news_.NotifyOne();
+  bool call = false;
+  {
+    MutexLock lock(&mu_);
+    foreground_.push_back(std::move(write));
+    call = !writing_ && TakeCall();
+  }
+  if (call) news_.NotifyOne();  // without the lock, which is the first thing that the other takes
 }
 
 void Committer::EnqueueBackground(Write write) {
   MutexLock lock(&mu_);
   waiting_bytes_ += write.batch.bytes();
   background_.push_back(std::move(write));
-  news_.NotifyOne();
+  if (!writing_) Call();
 }
 
 absl::Status Committer::AwaitRoom() {
@@ -68,52 +74,95 @@ absl::Status Committer::status() const {
   return status_;
 }
 
+// ---- who does what
+
 void Committer::Run() {
-  while (AwaitWork()) {
-    Round round = TakeRound();
-    const absl::Status status = Commit(round);
-    if (status.ok()) {
-      Acknowledge(round);
+  for (Role role = AwaitRole(); role != Role::kNone; role = AwaitRole()) {
+    if (role == Role::kWriter) {
+      WriteRound();
     } else {
-      Fail(round, status);
+      SyncRounds();
     }
   }
 }
 
-// False at the end.
-bool Committer::AwaitWork() {
+// kNone at the end: whoever has a role then does what is left.
+Committer::Role Committer::AwaitRole() {
   MutexLock lock(&mu_);
-  while (foreground_.empty() && background_.empty()) {
-    if (stopping_ || SyncIsDue()) return sync_at_.has_value();
-    if (sync_at_.has_value()) {
-      news_.WaitFor(&mu_, absl::FromChrono(*sync_at_ - Clock::now()));
-    } else {
-      news_.Wait(&mu_);
-    }
+  Role role = TakeRole();
+  while (role == Role::kNone && !stopping_) {
+    AwaitNews();
+    role = TakeRole();
   }
+  return role;
+}
+
+Committer::Role Committer::TakeRole() {
+  if (SyncIsDue()) {
+    syncing_ = true;
+    if (!writing_ && HasWaiting()) Call();
+    return Role::kSyncer;
+  }
+  if (writing_ || !HasWaiting()) return Role::kNone;
+  writing_ = true;
+  // A write can take long: somebody else has to see that a sync becomes due meanwhile.
+  if (sync_at_.has_value() && num_timed_ < num_idle_) Call();
+  return Role::kWriter;
+}
+
+void Committer::AwaitNews() {
+  ++num_idle_;
+  if (sync_at_.has_value() && !syncing_) {
+    ++num_timed_;
+    news_.WaitFor(&mu_, absl::FromChrono(*sync_at_ - Clock::now()));
+    --num_timed_;
+  } else {
+    news_.Wait(&mu_);
+  }
+  --num_idle_;
+  called_ = false;
+}
+
+bool Committer::HasWaiting() const { return !foreground_.empty() || !background_.empty(); }
+
+bool Committer::SyncIsDue() const {
+  if (syncing_) return false;
+  if (sync_wanted_ || (sync_at_.has_value() && Clock::now() >= *sync_at_)) return true;
+  const bool at_end = stopping_ && !writing_ && !HasWaiting();
+  return at_end && (sync_at_.has_value() || !not_on_disk_.empty());
+}
+
+// True when an idle thread is to be notified; one that was told already need not be.
+bool Committer::TakeCall() {
+  if (called_ || num_idle_ == 0) return false;
+  called_ = true;
   return true;
+}
+
+void Committer::Call() {
+  if (TakeCall()) news_.NotifyOne();
+}
+
+// ---- the writer
+
+void Committer::WriteRound() {
+  Round round = TakeRound();
+  round.status = Commit(round);
+  if (round.status.ok()) AcknowledgeWritten(round);
+  HandOver(std::move(round));
 }
 
 Committer::Round Committer::TakeRound() {
   Round round;
+  round.began = Clock::now();
   MutexLock lock(&mu_);
+  round.follows_sync = syncing_ || sync_wanted_;
   MoveFirst(foreground_, options_.round_bytes, round.writes);
-  if (foreground_.empty()) {
+  if (foreground_.empty() && !background_.empty()) {
     waiting_bytes_ -= MoveFirst(background_, options_.background_round_bytes, round.writes);
     room_.NotifyAll();
   }
-  bool sync = SyncIsDue() || (stopping_ && foreground_.empty() && background_.empty());
-  for (const Write& write : round.writes) {
-    sync |= write.durability == Durability::kSync && write.refusal.ok();
-  }
-  if (sync && IsDirtyAfter(round)) round.sync = Engine::Sync::kYes;
   return round;
-}
-
-// Whether something is not on disk once the round has been written.
-bool Committer::IsDirtyAfter(const Round& round) const {
-  const auto writes = [](const Write& write) { return write.refusal.ok() && !write.batch.changes().empty(); };
-  return sync_at_.has_value() || std::any_of(round.writes.begin(), round.writes.end(), writes);
 }
 
 absl::Status Committer::Commit(Round& round) {
@@ -123,46 +172,87 @@ absl::Status Committer::Commit(Round& round) {
     for (Write& write : round.writes) {
       if (write.refusal.ok()) batch.Append(std::move(write.batch));
     }
-    if (batch.changes().empty() && round.sync == Engine::Sync::kNo) return absl::OkStatus();
-    if (!sync_at_.has_value()) sync_at_ = Clock::now() + absl::ToChronoNanoseconds(options_.async_delay);
-    return engine_->Write(batch, round.sync);
+    if (batch.changes().empty()) return absl::OkStatus();
+    round.changes = true;
+    DYNMESH_RETURN_IF_ERROR(engine_->Write(batch));
   } catch (const std::bad_alloc&) {
     return StoreFailed("out of memory");
   }
+  return status();  // of a sync that has failed meanwhile
 }
 
-void Committer::Acknowledge(Round& round) {
-  if (round.sync == Engine::Sync::kYes) {
-    for (OnDisk& on_disk : not_on_disk_) on_disk(absl::OkStatus());
-    not_on_disk_.clear();
-    sync_at_.reset();
-  }
+// All but what the syncer acknowledges: kSync writes, and their refusals when there is one before them.
+void Committer::AcknowledgeWritten(Round& round) {
   for (Write& write : round.writes) {
-    if (write.on_disk != nullptr && write.refusal.ok()) SetOnDisk(write, round.sync);
-    if (write.done != nullptr) write.done(write.refusal);
+    if (write.durability == Durability::kSync &&
+        (write.refusal.ok() || round.follows_sync || round.wants_sync)) {
+      round.wants_sync = true;
+    } else if (write.done != nullptr) {
+      std::exchange(write.done, nullptr)(write.refusal);
+    }
   }
 }
 
-void Committer::SetOnDisk(Write& write, Engine::Sync sync) {
-  if (sync == Engine::Sync::kYes) {
-    write.on_disk(absl::OkStatus());
-  } else {
-    not_on_disk_.push_back(std::move(write.on_disk));
+void Committer::HandOver(Round round) {
+  MutexLock lock(&mu_);
+  writing_ = false;
+  if (!round.status.ok()) {
+    NoteFailure(round.status);
+  } else if (round.changes && !sync_at_.has_value()) {
+    sync_at_ = round.began + absl::ToChronoNanoseconds(options_.async_delay);
   }
+  sync_wanted_ |= round.wants_sync;
+  const auto is_unsettled = [](const Write& write) { return write.on_disk != nullptr || write.done != nullptr; };
+  if (std::any_of(round.writes.begin(), round.writes.end(), is_unsettled))
+    not_on_disk_.push_back(std::move(round));
 }
 
-void Committer::Fail(Round& round, const absl::Status& status) {
+// ---- the syncer
+
+void Committer::SyncRounds() {
+  std::vector<Round> rounds;
+  bool is_dirty = false;
+  absl::Status status;
   {
     MutexLock lock(&mu_);
-    if (status_.ok()) status_ = StoreReadOnly(status);
+    rounds.swap(not_on_disk_);
+    is_dirty = sync_at_.has_value();
+    sync_at_.reset();
+    sync_wanted_ = false;
+    status = failure_;
   }
-  for (OnDisk& on_disk : not_on_disk_) on_disk(status);
-  not_on_disk_.clear();
-  sync_at_.reset();
+  if (status.ok() && is_dirty) status = Sync();
+  for (Round& round : rounds) Settle(round, status);
+  MutexLock lock(&mu_);
+  syncing_ = false;
+}
+
+absl::Status Committer::Sync() {
+  absl::Status status;
+  try {
+    status = engine_->Sync();
+  } catch (const std::bad_alloc&) {
+    status = StoreFailed("out of memory");
+  }
+  MutexLock lock(&mu_);
+  if (!status.ok()) NoteFailure(status);
+  return status;
+}
+
+void Committer::Settle(Round& round, const absl::Status& synced) {
+  const absl::Status& status = round.status.ok() ? synced : round.status;
   for (Write& write : round.writes) {
     if (write.on_disk != nullptr && write.refusal.ok()) write.on_disk(status);
     if (write.done != nullptr) write.done(write.refusal.ok() ? status : write.refusal);
   }
+}
+
+// What was written before cannot be synced any more: the syncer says so.
+void Committer::NoteFailure(const absl::Status& status) {
+  sync_wanted_ = true;
+  if (!failure_.ok()) return;
+  failure_ = status;
+  status_ = StoreReadOnly(status);
 }
 
 AwaitedWrite::AwaitedWrite(EngineBatch batch, Durability durability) {

@@ -4,6 +4,7 @@
 #include <rocksdb/options.h>
 #include <rocksdb/write_batch.h>
 
+#include <atomic>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -59,7 +60,8 @@ class RocksDbEngine final : public Engine {
   /// Errors: DATA_LOSS STORE_DAMAGED.
   absl::Status CheckWrites();
 
-  absl::Status Write(const EngineBatch& batch, Sync sync) override;
+  absl::Status Write(const EngineBatch& batch) override;
+  absl::Status Sync() override;
   absl::StatusOr<absl::optional<std::string>> Get(absl::string_view key) const override;
   absl::Status Scan(absl::string_view from, absl::string_view to, Visitor visit) const override;
   absl::StatusOr<absl::optional<std::string>> LastKey(absl::string_view from,
@@ -69,7 +71,7 @@ class RocksDbEngine final : public Engine {
   const std::unique_ptr<DirectoryLock> lock_;  // destroyed last
   const std::unique_ptr<SyncedMark> mark_;
   const std::unique_ptr<rocksdb::DB> db_;
-  uint64_t num_writes_ = 0;
+  std::atomic<uint64_t> num_writes_{0};
 };
 
 absl::StatusOr<uint64_t> ReadWrites(absl::string_view value) {
@@ -86,7 +88,7 @@ absl::Status RocksDbEngine::CheckWrites() {
     DYNMESH_ASSIGN_OR_RETURN(num_writes_, ReadWrites(**value));
   }
   if (num_writes_ >= mark_->number()) return absl::OkStatus();
-  return StoreDamaged(absl::StrCat("the log ends with write ", num_writes_, ", but ", mark_->number(),
+  return StoreDamaged(absl::StrCat("the log ends with write ", num_writes_.load(), ", but ", mark_->number(),
                                    " were on disk; to go on with what is left, delete dynmesh.synced"));
 }
 
@@ -104,17 +106,21 @@ void AddChange(const EngineBatch::Change& change, rocksdb::WriteBatch& batch) {
   }
 }
 
-absl::Status RocksDbEngine::Write(const EngineBatch& batch, Sync sync) {
+absl::Status RocksDbEngine::Write(const EngineBatch& batch) {
   rocksdb::WriteBatch writes(batch.bytes());
   for (const EngineBatch::Change& change : batch.changes()) AddChange(change, writes);
   ByteWriter number;
   number.Fixed<uint64_t>(num_writes_ + 1);
   writes.Put(kWritesKey, number.bytes());
-  rocksdb::WriteOptions options;
-  options.sync = sync == Sync::kYes;
-  DYNMESH_RETURN_IF_ERROR(StatusOf(db_->Write(options, &writes)));
+  DYNMESH_RETURN_IF_ERROR(StatusOf(db_->Write(rocksdb::WriteOptions(), &writes)));
   ++num_writes_;
-  return sync == Sync::kYes ? mark_->Set(num_writes_) : absl::OkStatus();
+  return absl::OkStatus();
+}
+
+absl::Status RocksDbEngine::Sync() {
+  const uint64_t written = num_writes_;  // before: what is written from here on may not be synced
+  DYNMESH_RETURN_IF_ERROR(StatusOf(db_->SyncWAL()));
+  return mark_->Set(written);
 }
 
 absl::StatusOr<absl::optional<std::string>> RocksDbEngine::Get(absl::string_view key) const {
