@@ -10,6 +10,13 @@
 namespace dynmesh {
 namespace {
 
+/// So much that needs a sync is written at once, whoever else may come: then it pays to do so while one runs.
+constexpr size_t kGatheredBytes = size_t{1} << 18;
+
+/// What part of the time of the last sync the next one waits for those whom that was for.
+constexpr int kGatherPart = 4;
+constexpr std::chrono::milliseconds kMaxGather{2};
+
 // Moves the first writes, until they have so many bytes, and says how many they have.
 size_t MoveFirst(std::deque<Committer::Write>& from, size_t min_bytes, std::vector<Committer::Write>& to) {
   size_t bytes = 0;
@@ -40,8 +47,14 @@ void Committer::Enqueue(Write write) {
   bool call = false;
   {
     MutexLock lock(&mu_);
+    foreground_bytes_ += write.batch.bytes();
+    if (write.durability == Durability::kAsync) {
+      ++num_async_;
+    } else if (num_expected_ > 0) {
+      --num_expected_;
+    }
     foreground_.push_back(std::move(write));
-    call = !writing_ && TakeCall();
+    call = WriteIsDue() && TakeCall();
   }
   if (call) news_.NotifyOne();  // without the lock, which is the first thing that the other takes
 }
@@ -50,7 +63,7 @@ void Committer::EnqueueBackground(Write write) {
   MutexLock lock(&mu_);
   waiting_bytes_ += write.batch.bytes();
   background_.push_back(std::move(write));
-  if (!writing_) Call();
+  if (WriteIsDue()) Call();
 }
 
 absl::Status Committer::AwaitRoom() {
@@ -100,10 +113,10 @@ Committer::Role Committer::AwaitRole() {
 Committer::Role Committer::TakeRole() {
   if (SyncIsDue()) {
     syncing_ = true;
-    if (!writing_ && HasWaiting()) Call();
+    if (WriteIsDue()) Call();
     return Role::kSyncer;
   }
-  if (writing_ || !HasWaiting()) return Role::kNone;
+  if (!WriteIsDue()) return Role::kNone;
   writing_ = true;
   // A write can take long: somebody else has to see that a sync becomes due meanwhile.
   if (sync_at_.has_value() && num_timed_ < num_idle_) Call();
@@ -112,15 +125,16 @@ Committer::Role Committer::TakeRole() {
 
 void Committer::AwaitNews() {
   ++num_idle_;
-  if (sync_at_.has_value() && !syncing_) {
+  if (const auto next = NextDue(); next.has_value() && !syncing_) {
     ++num_timed_;
-    news_.WaitFor(&mu_, absl::FromChrono(*sync_at_ - Clock::now()));
+    news_.WaitFor(&mu_, absl::FromChrono(*next - Clock::now()));
     --num_timed_;
   } else {
     news_.Wait(&mu_);
   }
   --num_idle_;
   called_ = false;
+  if (!syncing_ && Clock::now() >= gather_until_) num_expected_ = 0;
 }
 
 bool Committer::HasWaiting() const { return !foreground_.empty() || !background_.empty(); }
@@ -130,6 +144,20 @@ bool Committer::SyncIsDue() const {
   if (sync_wanted_ || (sync_at_.has_value() && Clock::now() >= *sync_at_)) return true;
   const bool at_end = stopping_ && !writing_ && !HasWaiting();
   return at_end && (sync_at_.has_value() || !not_on_disk_.empty());
+}
+
+bool Committer::WriteIsDue() const {
+  if (writing_ || !HasWaiting()) return false;
+  if (num_async_ > 0 || !background_.empty() || foreground_bytes_ >= kGatheredBytes || stopping_) return true;
+  if (syncing_)
+    return sync_wanted_;  // else nothing is lost if they wait for more of their kind until it has ended
+  return num_expected_ == 0 || Clock::now() >= gather_until_;
+}
+
+// When to look again though there is no news.
+absl::optional<Committer::Clock::time_point> Committer::NextDue() const {
+  if (num_expected_ == 0) return sync_at_;
+  return sync_at_.has_value() ? std::min(*sync_at_, gather_until_) : gather_until_;
 }
 
 // True when an idle thread is to be notified; one that was told already need not be.
@@ -157,7 +185,8 @@ Committer::Round Committer::TakeRound() {
   round.began = Clock::now();
   MutexLock lock(&mu_);
   round.follows_sync = syncing_ || sync_wanted_;
-  MoveFirst(foreground_, options_.round_bytes, round.writes);
+  foreground_bytes_ -= MoveFirst(foreground_, options_.round_bytes, round.writes);
+  for (const Write& write : round.writes) num_async_ -= write.durability == Durability::kAsync;
   if (foreground_.empty() && !background_.empty()) {
     waiting_bytes_ -= MoveFirst(background_, options_.background_round_bytes, round.writes);
     room_.NotifyAll();
@@ -185,8 +214,8 @@ absl::Status Committer::Commit(Round& round) {
 void Committer::AcknowledgeWritten(Round& round) {
   for (Write& write : round.writes) {
     if (write.durability == Durability::kSync &&
-        (write.refusal.ok() || round.follows_sync || round.wants_sync)) {
-      round.wants_sync = true;
+        (write.refusal.ok() || round.follows_sync || round.num_syncing > 0)) {
+      ++round.num_syncing;
     } else if (write.done != nullptr) {
       std::exchange(write.done, nullptr)(write.refusal);
     }
@@ -201,8 +230,10 @@ void Committer::HandOver(Round round) {
   } else if (round.changes && !sync_at_.has_value()) {
     sync_at_ = round.began + absl::ToChronoNanoseconds(options_.async_delay);
   }
-  sync_wanted_ |= round.wants_sync;
-  const auto is_unsettled = [](const Write& write) { return write.on_disk != nullptr || write.done != nullptr; };
+  sync_wanted_ |= round.num_syncing > 0;
+  const auto is_unsettled = [](const Write& write) {
+    return write.on_disk != nullptr || write.done != nullptr;
+  };
   if (std::any_of(round.writes.begin(), round.writes.end(), is_unsettled))
     not_on_disk_.push_back(std::move(round));
 }
@@ -210,33 +241,40 @@ void Committer::HandOver(Round round) {
 // ---- the syncer
 
 void Committer::SyncRounds() {
+  const Clock::time_point began = Clock::now();
   std::vector<Round> rounds;
-  bool is_dirty = false;
-  absl::Status status;
-  {
-    MutexLock lock(&mu_);
-    rounds.swap(not_on_disk_);
-    is_dirty = sync_at_.has_value();
-    sync_at_.reset();
-    sync_wanted_ = false;
-    status = failure_;
-  }
-  if (status.ok() && is_dirty) status = Sync();
+  const absl::Status status = Sync(rounds);
+  const Clock::duration took = Clock::now() - began;
   for (Round& round : rounds) Settle(round, status);
   MutexLock lock(&mu_);
+  gather_until_ = Clock::now() + std::min<Clock::duration>(took / kGatherPart, kMaxGather);
   syncing_ = false;
 }
 
-absl::Status Committer::Sync() {
-  absl::Status status;
-  try {
-    status = engine_->Sync();
-  } catch (const std::bad_alloc&) {
-    status = StoreFailed("out of memory");
+// Takes the rounds that are not on disk and brings them there.
+absl::Status Committer::Sync(std::vector<Round>& rounds) {
+  {
+    MutexLock lock(&mu_);
+    const bool is_dirty = sync_at_.has_value();
+    rounds.swap(not_on_disk_);
+    sync_at_.reset();
+    sync_wanted_ = false;
+    if (!failure_.ok() || !is_dirty) return failure_;
   }
+  const absl::Status status = SyncEngine();
   MutexLock lock(&mu_);
   if (!status.ok()) NoteFailure(status);
+  num_expected_ = 0;
+  for (const Round& round : rounds) num_expected_ += round.num_syncing;
   return status;
+}
+
+absl::Status Committer::SyncEngine() {
+  try {
+    return engine_->Sync();
+  } catch (const std::bad_alloc&) {
+    return StoreFailed("out of memory");
+  }
 }
 
 void Committer::Settle(Round& round, const absl::Status& synced) {

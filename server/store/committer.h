@@ -90,7 +90,7 @@ class Committer {
     Clock::time_point began;
     bool follows_sync = false;  ///< kSync writes before it are not acknowledged yet
     bool changes = false;       ///< something was handed to the engine
-    bool wants_sync = false;
+    size_t num_syncing = 0;     ///< writes that wait for the disk
     absl::Status status;
   };
 
@@ -100,6 +100,8 @@ class Committer {
   void AwaitNews() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
   bool HasWaiting() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
   bool SyncIsDue() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
+  bool WriteIsDue() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
+  absl::optional<Clock::time_point> NextDue() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
   bool TakeCall() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
   void Call() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
 
@@ -110,7 +112,8 @@ class Committer {
   void HandOver(Round round);
 
   void SyncRounds();
-  absl::Status Sync();
+  absl::Status Sync(std::vector<Round>& rounds);
+  absl::Status SyncEngine();
   void Settle(Round& round, const absl::Status& synced);
   void NoteFailure(const absl::Status& status) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
 
@@ -120,6 +123,12 @@ class Committer {
   CondVar news_;  ///< something to do for a thread that has no role
   CondVar room_;
   std::deque<Write> foreground_ ABSL_GUARDED_BY(mu_);
+  size_t foreground_bytes_ ABSL_GUARDED_BY(mu_) = 0;
+  size_t num_async_ ABSL_GUARDED_BY(mu_) = 0;  ///< of the foreground
+  /// So many of those whom the last sync was for have not come back; until gather_until_ what needs a sync
+  /// waits for them.
+  size_t num_expected_ ABSL_GUARDED_BY(mu_) = 0;
+  Clock::time_point gather_until_ ABSL_GUARDED_BY(mu_);
   std::deque<Write> background_ ABSL_GUARDED_BY(mu_);
   size_t waiting_bytes_ ABSL_GUARDED_BY(mu_) = 0;
   absl::Status failure_ ABSL_GUARDED_BY(mu_);  ///< the first one
