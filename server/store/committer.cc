@@ -17,6 +17,9 @@ constexpr size_t kGatheredBytes = size_t{1} << 18;
 constexpr int kGatherPart = 4;
 constexpr std::chrono::milliseconds kMaxGather{2};
 
+/// How long the background waits when the engine is behind, before it looks again.
+constexpr std::chrono::milliseconds kCatchUp{2};
+
 // Moves the first writes, until they have so many bytes, and says how many they have.
 size_t MoveFirst(std::deque<Committer::Write>& from, size_t min_bytes, std::vector<Committer::Write>& to) {
   size_t bytes = 0;
@@ -113,7 +116,7 @@ Committer::Role Committer::AwaitRole() {
 Committer::Role Committer::TakeRole() {
   if (SyncIsDue()) {
     syncing_ = true;
-    if (WriteIsDue()) Call();
+    if (WriteIsDue() || !background_.empty()) Call();
     return Role::kSyncer;
   }
   if (!WriteIsDue()) return Role::kNone;
@@ -125,7 +128,7 @@ Committer::Role Committer::TakeRole() {
 
 void Committer::AwaitNews() {
   ++num_idle_;
-  if (const auto next = NextDue(); next.has_value() && !syncing_) {
+  if (const auto next = NextDue(); next.has_value()) {
     ++num_timed_;
     news_.WaitFor(&mu_, absl::FromChrono(*next - Clock::now()));
     --num_timed_;
@@ -148,16 +151,25 @@ bool Committer::SyncIsDue() const {
 
 bool Committer::WriteIsDue() const {
   if (writing_ || !HasWaiting()) return false;
-  if (num_async_ > 0 || !background_.empty() || foreground_bytes_ >= kGatheredBytes || stopping_) return true;
+  if (num_async_ > 0 || BackgroundIsDue() || foreground_bytes_ >= kGatheredBytes || stopping_) return true;
+  if (foreground_.empty()) return false;
   if (syncing_)
     return sync_wanted_;  // else nothing is lost if they wait for more of their kind until it has ended
   return num_expected_ == 0 || Clock::now() >= gather_until_;
 }
 
+bool Committer::BackgroundIsDue() const {
+  return !background_.empty() && (stopping_ || Clock::now() >= background_from_);
+}
+
 // When to look again though there is no news.
 absl::optional<Committer::Clock::time_point> Committer::NextDue() const {
-  if (num_expected_ == 0) return sync_at_;
-  return sync_at_.has_value() ? std::min(*sync_at_, gather_until_) : gather_until_;
+  absl::optional<Clock::time_point> next;
+  const auto add = [&](Clock::time_point time) { next = next.has_value() ? std::min(*next, time) : time; };
+  if (!syncing_ && sync_at_.has_value()) add(*sync_at_);
+  if (!syncing_ && num_expected_ > 0) add(gather_until_);
+  if (!writing_ && !background_.empty()) add(background_from_);
+  return next;
 }
 
 // True when an idle thread is to be notified; one that was told already need not be.
@@ -181,17 +193,26 @@ void Committer::WriteRound() {
 }
 
 Committer::Round Committer::TakeRound() {
+  const bool wait_with_background = HasBackground() && engine_->IsBehind();
   Round round;
   round.began = Clock::now();
   MutexLock lock(&mu_);
   round.follows_sync = syncing_ || sync_wanted_;
   foreground_bytes_ -= MoveFirst(foreground_, options_.round_bytes, round.writes);
   for (const Write& write : round.writes) num_async_ -= write.durability == Durability::kAsync;
-  if (foreground_.empty() && !background_.empty()) {
+  if (wait_with_background) {
+    background_from_ = round.began + kCatchUp;
+  } else if (foreground_.empty() && !background_.empty()) {
     waiting_bytes_ -= MoveFirst(background_, options_.background_round_bytes, round.writes);
     room_.NotifyAll();
   }
   return round;
+}
+
+// That is to be written, unless the engine is behind.
+bool Committer::HasBackground() const {
+  MutexLock lock(&mu_);
+  return !background_.empty() && status_.ok() && !stopping_;
 }
 
 absl::Status Committer::Commit(Round& round) {

@@ -101,12 +101,14 @@ class Committer {
   bool HasWaiting() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
   bool SyncIsDue() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
   bool WriteIsDue() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
+  bool BackgroundIsDue() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
   absl::optional<Clock::time_point> NextDue() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
   bool TakeCall() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
   void Call() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
 
   void WriteRound();
   Round TakeRound();
+  bool HasBackground() const;
   absl::Status Commit(Round& round);
   void AcknowledgeWritten(Round& round);
   void HandOver(Round round);
@@ -131,7 +133,8 @@ class Committer {
   Clock::time_point gather_until_ ABSL_GUARDED_BY(mu_);
   std::deque<Write> background_ ABSL_GUARDED_BY(mu_);
   size_t waiting_bytes_ ABSL_GUARDED_BY(mu_) = 0;
-  absl::Status failure_ ABSL_GUARDED_BY(mu_);  ///< the first one
+  Clock::time_point background_from_ ABSL_GUARDED_BY(mu_);  ///< until then the engine is left to catch up
+  absl::Status failure_ ABSL_GUARDED_BY(mu_);               ///< the first one
   absl::Status status_ ABSL_GUARDED_BY(mu_);
   bool stopping_ ABSL_GUARDED_BY(mu_) = false;
 

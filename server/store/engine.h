@@ -70,6 +70,10 @@ class Engine {
   /// What was written before the call is on disk on return. What is written meanwhile may be, or not.
   virtual absl::Status Sync() = 0;
 
+  /// Whether writes would soon have to wait for what moves earlier ones to their place: what has time should
+  /// wait instead. Never for ever.
+  virtual bool IsBehind() const { return false; }
+
   virtual absl::StatusOr<absl::optional<std::string>> Get(absl::string_view key) const = 0;
 
   /// Keys in [from, to) in order, as they were at one moment. `visit` must not write.

@@ -20,6 +20,8 @@ namespace {
 // Sorts before all keys of stores, which begin with letters. Its value: the number of writes so far.
 constexpr char kWritesKey[] = "#";
 constexpr size_t kMemtableBytes = size_t{32} << 20;
+// As many may wait to be flushed before writes stop, and pages stop one before that.
+constexpr int kMaxMemtables = 3;
 constexpr size_t kMaxInfoLogBytes = size_t{1} << 20;
 
 rocksdb::Slice SliceOf(absl::string_view text) { return {text.data(), text.size()}; }
@@ -44,6 +46,7 @@ rocksdb::Options DatabaseOptions(rocksdb::Env* env) {
   options.avoid_flush_during_shutdown = true;
   options.max_bgerror_resume_count = 0;  // after an error only opening again tells what is there
   options.write_buffer_size = kMemtableBytes;
+  options.max_write_buffer_number = kMaxMemtables;
   options.compression = rocksdb::kLZ4Compression;
   options.info_log_level = rocksdb::WARN_LEVEL;
   options.max_log_file_size = kMaxInfoLogBytes;
@@ -62,12 +65,15 @@ class RocksDbEngine final : public Engine {
 
   absl::Status Write(const EngineBatch& batch) override;
   absl::Status Sync() override;
+  bool IsBehind() const override;
   absl::StatusOr<absl::optional<std::string>> Get(absl::string_view key) const override;
   absl::Status Scan(absl::string_view from, absl::string_view to, Visitor visit) const override;
   absl::StatusOr<absl::optional<std::string>> LastKey(absl::string_view from,
                                                       absl::string_view to) const override;
 
  private:
+  uint64_t Property(const rocksdb::Slice& name) const;
+
   const std::unique_ptr<DirectoryLock> lock_;  // destroyed last
   const std::unique_ptr<SyncedMark> mark_;
   const std::unique_ptr<rocksdb::DB> db_;
@@ -121,6 +127,18 @@ absl::Status RocksDbEngine::Sync() {
   const uint64_t written = num_writes_;  // before: what is written from here on may not be synced
   DYNMESH_RETURN_IF_ERROR(StatusOf(db_->SyncWAL()));
   return mark_->Set(written);
+}
+
+uint64_t RocksDbEngine::Property(const rocksdb::Slice& name) const {
+  uint64_t value = 0;
+  db_->GetIntProperty(name, &value);
+  return value;
+}
+
+bool RocksDbEngine::IsBehind() const {
+  if (Property(rocksdb::DB::Properties::kBackgroundErrors) > 0) return false;  // a write will tell
+  return Property(rocksdb::DB::Properties::kNumImmutableMemTable) >= kMaxMemtables - 1 ||
+         Property(rocksdb::DB::Properties::kActualDelayedWriteRate) > 0;
 }
 
 absl::StatusOr<absl::optional<std::string>> RocksDbEngine::Get(absl::string_view key) const {
