@@ -116,7 +116,7 @@ Committer::Role Committer::AwaitRole() {
 Committer::Role Committer::TakeRole() {
   if (SyncIsDue()) {
     syncing_ = true;
-    if (WriteIsDue() || !background_.empty()) Call();
+    if (WriteIsDue() || BackgroundWaits()) Call();
     return Role::kSyncer;
   }
   if (!WriteIsDue()) return Role::kNone;
@@ -158,8 +158,11 @@ bool Committer::WriteIsDue() const {
   return num_expected_ == 0 || Clock::now() >= gather_until_;
 }
 
+// Not while a sync runs that somebody waits for: the next one would take as much longer as they are.
+bool Committer::BackgroundWaits() const { return !background_.empty() && (!awaited_ || stopping_); }
+
 bool Committer::BackgroundIsDue() const {
-  return !background_.empty() && (stopping_ || Clock::now() >= background_from_);
+  return BackgroundWaits() && (stopping_ || Clock::now() >= background_from_);
 }
 
 // When to look again though there is no news.
@@ -168,7 +171,7 @@ absl::optional<Committer::Clock::time_point> Committer::NextDue() const {
   const auto add = [&](Clock::time_point time) { next = next.has_value() ? std::min(*next, time) : time; };
   if (!syncing_ && sync_at_.has_value()) add(*sync_at_);
   if (!syncing_ && num_expected_ > 0) add(gather_until_);
-  if (!writing_ && !background_.empty()) add(background_from_);
+  if (!writing_ && BackgroundWaits()) add(background_from_);
   return next;
 }
 
@@ -202,7 +205,7 @@ Committer::Round Committer::TakeRound() {
   for (const Write& write : round.writes) num_async_ -= write.durability == Durability::kAsync;
   if (wait_with_background) {
     background_from_ = round.began + kCatchUp;
-  } else if (foreground_.empty() && !background_.empty()) {
+  } else if (foreground_.empty() && BackgroundWaits()) {
     waiting_bytes_ -= MoveFirst(background_, options_.background_round_bytes, round.writes);
     room_.NotifyAll();
   }
@@ -212,7 +215,7 @@ Committer::Round Committer::TakeRound() {
 // That is to be written, unless the engine is behind.
 bool Committer::HasBackground() const {
   MutexLock lock(&mu_);
-  return !background_.empty() && status_.ok() && !stopping_;
+  return BackgroundWaits() && status_.ok() && !stopping_;
 }
 
 absl::Status Committer::Commit(Round& round) {
@@ -269,7 +272,7 @@ void Committer::SyncRounds() {
   for (Round& round : rounds) Settle(round, status);
   MutexLock lock(&mu_);
   gather_until_ = Clock::now() + std::min<Clock::duration>(took / kGatherPart, kMaxGather);
-  syncing_ = false;
+  syncing_ = awaited_ = false;
 }
 
 // Takes the rounds that are not on disk and brings them there.
@@ -279,7 +282,7 @@ absl::Status Committer::Sync(std::vector<Round>& rounds) {
     const bool is_dirty = sync_at_.has_value();
     rounds.swap(not_on_disk_);
     sync_at_.reset();
-    sync_wanted_ = false;
+    awaited_ = std::exchange(sync_wanted_, false);
     if (!failure_.ok() || !is_dirty) return failure_;
   }
   const absl::Status status = SyncEngine();

@@ -101,6 +101,7 @@ class Committer {
   bool HasWaiting() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
   bool SyncIsDue() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
   bool WriteIsDue() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
+  bool BackgroundWaits() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
   bool BackgroundIsDue() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
   absl::optional<Clock::time_point> NextDue() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
   bool TakeCall() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
@@ -140,6 +141,7 @@ class Committer {
 
   bool writing_ ABSL_GUARDED_BY(mu_) = false;  ///< somebody is the writer
   bool syncing_ ABSL_GUARDED_BY(mu_) = false;  ///< somebody is the syncer
+  bool awaited_ ABSL_GUARDED_BY(mu_) = false;  ///< and somebody waits for that sync
   int num_idle_ ABSL_GUARDED_BY(mu_) = 0;      ///< threads that wait for news
   int num_timed_ ABSL_GUARDED_BY(mu_) = 0;     ///< those of them that wake when a sync is due
   bool called_ ABSL_GUARDED_BY(mu_) = false;   ///< an idle thread was told, and has not begun to look
