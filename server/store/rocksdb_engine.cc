@@ -22,6 +22,7 @@ constexpr char kWritesKey[] = "#";
 constexpr size_t kMemtableBytes = size_t{32} << 20;
 // As many may wait to be flushed before writes stop, and pages stop one before that.
 constexpr int kMaxMemtables = 3;
+constexpr size_t kKeptBatchBytes = size_t{1} << 20;
 constexpr size_t kMaxInfoLogBytes = size_t{1} << 20;
 
 rocksdb::Slice SliceOf(absl::string_view text) { return {text.data(), text.size()}; }
@@ -78,6 +79,7 @@ class RocksDbEngine final : public Engine {
   const std::unique_ptr<SyncedMark> mark_;
   const std::unique_ptr<rocksdb::DB> db_;
   std::atomic<uint64_t> num_writes_{0};
+  rocksdb::WriteBatch batch_;  ///< the writer's
 };
 
 absl::StatusOr<uint64_t> ReadWrites(absl::string_view value) {
@@ -113,12 +115,13 @@ void AddChange(const EngineBatch::Change& change, rocksdb::WriteBatch& batch) {
 }
 
 absl::Status RocksDbEngine::Write(const EngineBatch& batch) {
-  rocksdb::WriteBatch writes(batch.bytes());
-  for (const EngineBatch::Change& change : batch.changes()) AddChange(change, writes);
+  if (batch_.GetDataSize() > kKeptBatchBytes) batch_ = rocksdb::WriteBatch();
+  batch_.Clear();  // keeps its memory
+  for (const EngineBatch::Change& change : batch.changes()) AddChange(change, batch_);
   ByteWriter number;
   number.Fixed<uint64_t>(num_writes_ + 1);
-  writes.Put(kWritesKey, number.bytes());
-  DYNMESH_RETURN_IF_ERROR(StatusOf(db_->Write(rocksdb::WriteOptions(), &writes)));
+  batch_.Put(kWritesKey, number.bytes());
+  DYNMESH_RETURN_IF_ERROR(StatusOf(db_->Write(rocksdb::WriteOptions(), &batch_)));
   ++num_writes_;
   return absl::OkStatus();
 }
