@@ -1,50 +1,50 @@
 #include "server/store/committer.h"
 
 #include <algorithm>
-#include <new>
 #include <utility>
-
-#include "server/store/store_errors.h"
 
 namespace dynmesh {
 namespace {
 
-// Moves the first writes, until they have so many bytes, and says how many they have.
-size_t MoveFirst(std::deque<Committer::Write>& from, size_t min_bytes, std::vector<Committer::Write>& to) {
-  size_t bytes = 0;
-  while (!from.empty() && bytes < min_bytes) {
-    bytes += from.front().batch.bytes();
-    to.push_back(std::move(from.front()));
-    from.pop_front();
-  }
-  return bytes;
-}
+/// So much that needs a sync is written at once, whoever else may come: then it pays to do so while one runs.
+constexpr size_t kGatheredBytes = size_t{1} << 18;
 
 }  // namespace
 
-Committer::Committer(Engine* engine, const CommitterOptions& options)
-    : engine_(engine), options_(options), thread_([this] { Run(); }) {}
+Committer::Committer(Engine* engine, const CommitterOptions& options) : engine_(engine), options_(options) {
+  for (std::thread& thread : threads_) thread = std::thread([this] { Run(); });
+}
 
 Committer::~Committer() {
   {
     MutexLock lock(&mu_);
     stopping_ = true;
-    news_.NotifyOne();
+    news_.NotifyAll();
   }
-  thread_.join();
+  for (std::thread& thread : threads_) thread.join();
 }
 
 void Committer::Enqueue(Write write) {
-  MutexLock lock(&mu_);
-  foreground_.push_back(std::move(write));
-  news_.NotifyOne();
+  bool call = false;
+  {
+    MutexLock lock(&mu_);
+    foreground_bytes_ += write.batch.bytes();
+    if (write.durability == Durability::kAsync) {
+      ++num_async_;
+    } else if (num_expected_ > 0) {
+      --num_expected_;
+    }
+    foreground_.push_back(std::move(write));
+    call = WriteIsDue() && TakeCall();
+  }
+  if (call) news_.NotifyOne();  // without the lock, which is the first thing that the other takes
 }
 
 void Committer::EnqueueBackground(Write write) {
   MutexLock lock(&mu_);
   waiting_bytes_ += write.batch.bytes();
   background_.push_back(std::move(write));
-  news_.NotifyOne();
+  if (WriteIsDue()) Call();
 }
 
 absl::Status Committer::AwaitRoom() {
@@ -68,101 +68,100 @@ absl::Status Committer::status() const {
   return status_;
 }
 
+// ---- who does what
+
 void Committer::Run() {
-  while (AwaitWork()) {
-    Round round = TakeRound();
-    const absl::Status status = Commit(round);
-    if (status.ok()) {
-      Acknowledge(round);
+  for (Role role = AwaitRole(); role != Role::kNone; role = AwaitRole()) {
+    if (role == Role::kWriter) {
+      WriteRound();
     } else {
-      Fail(round, status);
+      SyncRounds();
     }
   }
 }
 
-// False at the end.
-bool Committer::AwaitWork() {
+// kNone at the end: whoever has a role then does what is left.
+Committer::Role Committer::AwaitRole() {
   MutexLock lock(&mu_);
-  while (foreground_.empty() && background_.empty()) {
-    if (stopping_ || SyncIsDue()) return sync_at_.has_value();
-    if (sync_at_.has_value()) {
-      news_.WaitFor(&mu_, absl::FromChrono(*sync_at_ - Clock::now()));
-    } else {
-      news_.Wait(&mu_);
-    }
+  Role role = TakeRole();
+  while (role == Role::kNone && !stopping_) {
+    AwaitNews();
+    role = TakeRole();
   }
+  return role;
+}
+
+Committer::Role Committer::TakeRole() {
+  if (SyncIsDue()) {
+    syncing_ = true;
+    if (WriteIsDue() || BackgroundWaits()) Call();
+    return Role::kSyncer;
+  }
+  if (!WriteIsDue()) return Role::kNone;
+  writing_ = true;
+  // A write can take long: somebody else has to see that a sync becomes due meanwhile.
+  if (sync_at_.has_value() && num_timed_ < num_idle_) Call();
+  return Role::kWriter;
+}
+
+void Committer::AwaitNews() {
+  ++num_idle_;
+  if (const auto next = NextDue(); next.has_value()) {
+    ++num_timed_;
+    news_.WaitFor(&mu_, absl::FromChrono(*next - Clock::now()));
+    --num_timed_;
+  } else {
+    news_.Wait(&mu_);
+  }
+  --num_idle_;
+  called_ = false;
+  if (!syncing_ && Clock::now() >= gather_until_) num_expected_ = 0;
+}
+
+bool Committer::HasWaiting() const { return !foreground_.empty() || !background_.empty(); }
+
+bool Committer::SyncIsDue() const {
+  if (syncing_) return false;
+  if (sync_wanted_ || (sync_at_.has_value() && Clock::now() >= *sync_at_)) return true;
+  const bool at_end = stopping_ && !writing_ && !HasWaiting();
+  return at_end && (sync_at_.has_value() || !not_on_disk_.empty());
+}
+
+bool Committer::WriteIsDue() const {
+  if (writing_ || !HasWaiting()) return false;
+  if (num_async_ > 0 || BackgroundIsDue() || foreground_bytes_ >= kGatheredBytes || stopping_) return true;
+  if (foreground_.empty()) return false;
+  if (syncing_)
+    return sync_wanted_;  // else nothing is lost if they wait for more of their kind until it has ended
+  return num_expected_ == 0 || Clock::now() >= gather_until_;
+}
+
+// Not while a sync runs that somebody waits for: the next one would take as much longer as they are.
+bool Committer::BackgroundWaits() const { return !background_.empty() && (!awaited_ || stopping_); }
+
+bool Committer::BackgroundIsDue() const {
+  return BackgroundWaits() && (stopping_ || Clock::now() >= background_from_);
+}
+
+// When to look again though there is no news.
+absl::optional<Committer::Clock::time_point> Committer::NextDue() const {
+  absl::optional<Clock::time_point> next;
+  const auto add = [&](Clock::time_point time) { next = next.has_value() ? std::min(*next, time) : time; };
+  if (!syncing_ && sync_at_.has_value()) add(*sync_at_);
+  if (!syncing_ && num_expected_ > 0) add(gather_until_);
+  if (!writing_ && BackgroundWaits()) add(background_from_);
+  return next;
+}
+
+// True when an idle thread is to be notified; one that was told already need not be.
+bool Committer::TakeCall() {
+  if (called_ || num_idle_ == 0) return false;
+  called_ = true;
   return true;
 }
 
-Committer::Round Committer::TakeRound() {
-  Round round;
-  MutexLock lock(&mu_);
-  MoveFirst(foreground_, options_.round_bytes, round.writes);
-  if (foreground_.empty()) {
-    waiting_bytes_ -= MoveFirst(background_, options_.background_round_bytes, round.writes);
-    room_.NotifyAll();
-  }
-  bool sync = SyncIsDue() || (stopping_ && foreground_.empty() && background_.empty());
-  for (const Write& write : round.writes) {
-    sync |= write.durability == Durability::kSync && write.refusal.ok();
-  }
-  if (sync && IsDirtyAfter(round)) round.sync = Engine::Sync::kYes;
-  return round;
-}
-
-// Whether something is not on disk once the round has been written.
-bool Committer::IsDirtyAfter(const Round& round) const {
-  const auto writes = [](const Write& write) { return write.refusal.ok() && !write.batch.changes().empty(); };
-  return sync_at_.has_value() || std::any_of(round.writes.begin(), round.writes.end(), writes);
-}
-
-absl::Status Committer::Commit(Round& round) {
-  if (absl::Status failed = status(); !failed.ok()) return failed;
-  try {
-    EngineBatch batch;
-    for (Write& write : round.writes) {
-      if (write.refusal.ok()) batch.Append(std::move(write.batch));
-    }
-    if (batch.changes().empty() && round.sync == Engine::Sync::kNo) return absl::OkStatus();
-    if (!sync_at_.has_value()) sync_at_ = Clock::now() + absl::ToChronoNanoseconds(options_.async_delay);
-    return engine_->Write(batch, round.sync);
-  } catch (const std::bad_alloc&) {
-    return StoreFailed("out of memory");
-  }
-}
-
-void Committer::Acknowledge(Round& round) {
-  if (round.sync == Engine::Sync::kYes) {
-    for (OnDisk& on_disk : not_on_disk_) on_disk(absl::OkStatus());
-    not_on_disk_.clear();
-    sync_at_.reset();
-  }
-  for (Write& write : round.writes) {
-    if (write.on_disk != nullptr && write.refusal.ok()) SetOnDisk(write, round.sync);
-    if (write.done != nullptr) write.done(write.refusal);
-  }
-}
-
-void Committer::SetOnDisk(Write& write, Engine::Sync sync) {
-  if (sync == Engine::Sync::kYes) {
-    write.on_disk(absl::OkStatus());
-  } else {
-    not_on_disk_.push_back(std::move(write.on_disk));
-  }
-}
-
-void Committer::Fail(Round& round, const absl::Status& status) {
-  {
-    MutexLock lock(&mu_);
-    if (status_.ok()) status_ = StoreReadOnly(status);
-  }
-  for (OnDisk& on_disk : not_on_disk_) on_disk(status);
-  not_on_disk_.clear();
-  sync_at_.reset();
-  for (Write& write : round.writes) {
-    if (write.on_disk != nullptr && write.refusal.ok()) write.on_disk(status);
-    if (write.done != nullptr) write.done(write.refusal.ok() ? status : write.refusal);
-  }
+void Committer::Call() {
+  if (TakeCall()) news_.NotifyOne();
 }
 
 AwaitedWrite::AwaitedWrite(EngineBatch batch, Durability durability) {

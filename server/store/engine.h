@@ -54,19 +54,25 @@ class EngineBatch {
 /// Writes are durable in order: what is on disk after a crash is what a first part of them made. What an
 /// engine finds when it is opened is on disk from then on.
 /// Errors of all: DATA_LOSS STORE_DAMAGED, UNAVAILABLE STORE_FAILED.
-/// Errors of writes: also RESOURCE_EXHAUSTED STORE_FULL.
-/// Thread safety: full, except that one thread at a time writes.
+/// Errors of Write() and Sync(): also RESOURCE_EXHAUSTED STORE_FULL. After one of either nothing is known of
+/// that batch, or of what was not on disk: write nothing more. Thread safety: full, except that one thread at
+/// a time writes, and one at a time syncs: each beside the other.
 class Engine {
  public:
-  enum class Sync { kNo, kYes };
   /// The views are valid during the call. An error ends the scan and is its result.
   using Visitor = absl::FunctionRef<absl::Status(absl::string_view key, absl::string_view value)>;
 
   virtual ~Engine() = default;
 
-  /// With kYes all that was written, this batch (it may be empty) and those before, is on disk on return.
-  /// After an error nothing is known of the batch, or of what was not on disk; write nothing more.
-  virtual absl::Status Write(const EngineBatch& batch, Sync sync) = 0;
+  /// From here on it is read, and survives the end of the process.
+  virtual absl::Status Write(const EngineBatch& batch) = 0;
+
+  /// What was written before the call is on disk on return. What is written meanwhile may be, or not.
+  virtual absl::Status Sync() = 0;
+
+  /// Whether writes would soon have to wait for what moves earlier ones to their place: what has time should
+  /// wait instead. Never for ever.
+  virtual bool IsBehind() const { return false; }
 
   virtual absl::StatusOr<absl::optional<std::string>> Get(absl::string_view key) const = 0;
 

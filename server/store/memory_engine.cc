@@ -6,7 +6,7 @@
 
 namespace dynmesh {
 
-absl::Status MemoryEngine::Write(const EngineBatch& batch, Sync) {
+absl::Status MemoryEngine::Write(const EngineBatch& batch) {
   WriterMutexLock lock(&mu_);
   for (const EngineBatch::Change& change : batch.changes()) Apply(change);
   return absl::OkStatus();

@@ -16,7 +16,8 @@ namespace dynmesh {
 /// A scan holds writers up.
 class MemoryEngine final : public Engine {
  public:
-  absl::Status Write(const EngineBatch& batch, Sync sync) override;
+  absl::Status Write(const EngineBatch& batch) override;
+  absl::Status Sync() override { return absl::OkStatus(); }
   absl::StatusOr<absl::optional<std::string>> Get(absl::string_view key) const override;
   absl::Status Scan(absl::string_view from, absl::string_view to, Visitor visit) const override;
   absl::StatusOr<absl::optional<std::string>> LastKey(absl::string_view from,

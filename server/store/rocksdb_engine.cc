@@ -4,6 +4,7 @@
 #include <rocksdb/options.h>
 #include <rocksdb/write_batch.h>
 
+#include <atomic>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -19,6 +20,9 @@ namespace {
 // Sorts before all keys of stores, which begin with letters. Its value: the number of writes so far.
 constexpr char kWritesKey[] = "#";
 constexpr size_t kMemtableBytes = size_t{32} << 20;
+// As many may wait to be flushed before writes stop, and pages stop one before that.
+constexpr int kMaxMemtables = 3;
+constexpr size_t kKeptBatchBytes = size_t{1} << 20;
 constexpr size_t kMaxInfoLogBytes = size_t{1} << 20;
 
 rocksdb::Slice SliceOf(absl::string_view text) { return {text.data(), text.size()}; }
@@ -43,6 +47,7 @@ rocksdb::Options DatabaseOptions(rocksdb::Env* env) {
   options.avoid_flush_during_shutdown = true;
   options.max_bgerror_resume_count = 0;  // after an error only opening again tells what is there
   options.write_buffer_size = kMemtableBytes;
+  options.max_write_buffer_number = kMaxMemtables;
   options.compression = rocksdb::kLZ4Compression;
   options.info_log_level = rocksdb::WARN_LEVEL;
   options.max_log_file_size = kMaxInfoLogBytes;
@@ -59,17 +64,22 @@ class RocksDbEngine final : public Engine {
   /// Errors: DATA_LOSS STORE_DAMAGED.
   absl::Status CheckWrites();
 
-  absl::Status Write(const EngineBatch& batch, Sync sync) override;
+  absl::Status Write(const EngineBatch& batch) override;
+  absl::Status Sync() override;
+  bool IsBehind() const override;
   absl::StatusOr<absl::optional<std::string>> Get(absl::string_view key) const override;
   absl::Status Scan(absl::string_view from, absl::string_view to, Visitor visit) const override;
   absl::StatusOr<absl::optional<std::string>> LastKey(absl::string_view from,
                                                       absl::string_view to) const override;
 
  private:
+  uint64_t Property(const rocksdb::Slice& name) const;
+
   const std::unique_ptr<DirectoryLock> lock_;  // destroyed last
   const std::unique_ptr<SyncedMark> mark_;
   const std::unique_ptr<rocksdb::DB> db_;
-  uint64_t num_writes_ = 0;
+  std::atomic<uint64_t> num_writes_{0};
+  rocksdb::WriteBatch batch_;  ///< the writer's
 };
 
 absl::StatusOr<uint64_t> ReadWrites(absl::string_view value) {
@@ -86,7 +96,7 @@ absl::Status RocksDbEngine::CheckWrites() {
     DYNMESH_ASSIGN_OR_RETURN(num_writes_, ReadWrites(**value));
   }
   if (num_writes_ >= mark_->number()) return absl::OkStatus();
-  return StoreDamaged(absl::StrCat("the log ends with write ", num_writes_, ", but ", mark_->number(),
+  return StoreDamaged(absl::StrCat("the log ends with write ", num_writes_.load(), ", but ", mark_->number(),
                                    " were on disk; to go on with what is left, delete dynmesh.synced"));
 }
 
@@ -104,17 +114,34 @@ void AddChange(const EngineBatch::Change& change, rocksdb::WriteBatch& batch) {
   }
 }
 
-absl::Status RocksDbEngine::Write(const EngineBatch& batch, Sync sync) {
-  rocksdb::WriteBatch writes(batch.bytes());
-  for (const EngineBatch::Change& change : batch.changes()) AddChange(change, writes);
+absl::Status RocksDbEngine::Write(const EngineBatch& batch) {
+  if (batch_.GetDataSize() > kKeptBatchBytes) batch_ = rocksdb::WriteBatch();
+  batch_.Clear();  // keeps its memory
+  for (const EngineBatch::Change& change : batch.changes()) AddChange(change, batch_);
   ByteWriter number;
   number.Fixed<uint64_t>(num_writes_ + 1);
-  writes.Put(kWritesKey, number.bytes());
-  rocksdb::WriteOptions options;
-  options.sync = sync == Sync::kYes;
-  DYNMESH_RETURN_IF_ERROR(StatusOf(db_->Write(options, &writes)));
+  batch_.Put(kWritesKey, number.bytes());
+  DYNMESH_RETURN_IF_ERROR(StatusOf(db_->Write(rocksdb::WriteOptions(), &batch_)));
   ++num_writes_;
-  return sync == Sync::kYes ? mark_->Set(num_writes_) : absl::OkStatus();
+  return absl::OkStatus();
+}
+
+absl::Status RocksDbEngine::Sync() {
+  const uint64_t written = num_writes_;  // before: what is written from here on may not be synced
+  DYNMESH_RETURN_IF_ERROR(StatusOf(db_->SyncWAL()));
+  return mark_->Set(written);
+}
+
+uint64_t RocksDbEngine::Property(const rocksdb::Slice& name) const {
+  uint64_t value = 0;
+  db_->GetIntProperty(name, &value);
+  return value;
+}
+
+bool RocksDbEngine::IsBehind() const {
+  if (Property(rocksdb::DB::Properties::kBackgroundErrors) > 0) return false;  // a write will tell
+  return Property(rocksdb::DB::Properties::kNumImmutableMemTable) >= kMaxMemtables - 1 ||
+         Property(rocksdb::DB::Properties::kActualDelayedWriteRate) > 0;
 }
 
 absl::StatusOr<absl::optional<std::string>> RocksDbEngine::Get(absl::string_view key) const {

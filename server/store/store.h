@@ -107,13 +107,13 @@ class SessionStore {
   /// The last one that is known to survive a loss of power.
   virtual int64_t durable_revision() const = 0;
   /// From now on `watcher` is called whenever that has grown, and with an error when what was written will
-  /// never be on disk, on a thread of the store; null: nobody is. It
-  /// must be short, and must not wait for the store. One call may still be under way when this, or the
-  /// destructor, returns.
+  /// never be on disk, on threads of the store, one call at a time; null: nobody is. It must be short, and
+  /// must not wait for the store. One call may still be under way when this, or the destructor, returns.
   virtual void WatchDurable(Watcher watcher) = 0;
 
-  /// Acknowledgements come in the order of the calls. A record that was not acknowledged may be found after a
-  /// crash all the same, but only whole and only with all before it.
+  /// Acknowledgements come in the order of the calls among those of the same durability; a kAsync one does
+  /// not wait for the disk, so it may come before that of a kSync call that was earlier. A record that was
+  /// not acknowledged may be found after a crash all the same, but only whole and only with all before it.
   /// Errors: INVALID_ARGUMENT BAD_ARGUMENT (the revision is not a later one); RESOURCE_EXHAUSTED
   /// LIMIT_EXCEEDED (kMaxStoredBytes).
   virtual void Append(Record record, Durability durability, Done done) = 0;
@@ -132,10 +132,15 @@ class SessionStore {
   /// is known to be good: drop them on an error. Errors: NOT_FOUND CHECKPOINT_NOT_FOUND.
   virtual absl::StatusOr<Checkpoint> ReadCheckpoint(uint64_t number, PageFn fn) = 0;
 
-  /// One at a time. `revision` is that of the state which the records after it will be added to: pages may
-  /// hold later changes, if records tell them again. A checkpoint beyond the last record replaces all
-  /// records. Errors: FAILED_PRECONDITION CHECKPOINT_OPEN; INVALID_ARGUMENT BAD_ARGUMENT (a revision before
-  /// the last checkpoint's).
+  /// One at a time. Recovery applies the records after `revision` to the pages, so these hold all that
+  /// records up to it say. They may also hold what later ones say, each page up to another revision, if
+  ///  - applying a record to pages that hold it already changes nothing, and
+  ///  - when Commit() is called, durable_revision() is at least the last revision of which any page holds
+  ///    something: else a loss of power leaves the page without the record that tells the rest of that
+  ///    change.
+  /// A checkpoint beyond the last record replaces all records, so its pages hold exactly `revision`.
+  /// Errors: FAILED_PRECONDITION CHECKPOINT_OPEN; INVALID_ARGUMENT BAD_ARGUMENT (a revision before the last
+  /// checkpoint's).
   virtual absl::StatusOr<std::unique_ptr<CheckpointWriter>> BeginCheckpoint(int64_t revision) = 0;
 
   /// Deletes a former checkpoint and the pages that no other one has. Not from a Done. Errors: NOT_FOUND

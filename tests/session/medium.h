@@ -22,7 +22,7 @@ class Medium {
     return store.ok() ? *std::move(store) : nullptr;
   }
 
-  /// Until Release() or Fail() whoever writes waits.
+  /// Until Release() or Fail() whoever writes or syncs waits.
   void Hold() {
     MutexLock lock(&mu_);
     held_ = true;
@@ -32,7 +32,7 @@ class Medium {
     held_ = false;
     changed_.NotifyAll();
   }
-  /// From now on writes that are to be on disk fail, the delayed ones too; others go on.
+  /// From now on nothing reaches the disk, though it is written.
   void FailSyncs(const absl::Status& status) {
     MutexLock lock(&mu_);
     sync_failure_ = status;
@@ -55,9 +55,13 @@ class Medium {
    public:
     explicit Connection(Medium& medium) : medium_(medium) {}
 
-    absl::Status Write(const EngineBatch& batch, Sync sync) override {
-      const absl::Status admitted = medium_.Admit(sync);
-      return admitted.ok() ? medium_.memory_.Write(batch, sync) : admitted;
+    absl::Status Write(const EngineBatch& batch) override {
+      const absl::Status admitted = medium_.Admit();
+      return admitted.ok() ? medium_.memory_.Write(batch) : admitted;
+    }
+    absl::Status Sync() override {
+      const absl::Status admitted = medium_.Admit();
+      return admitted.ok() ? medium_.sync_failure() : admitted;
     }
     absl::StatusOr<absl::optional<std::string>> Get(absl::string_view key) const override {
       const absl::Status readable = medium_.read_failure();
@@ -82,10 +86,14 @@ class Medium {
     return read_failure_;
   }
 
-  absl::Status Admit(Engine::Sync sync) {
+  absl::Status Admit() {
     MutexLock lock(&mu_);
     while (held_) changed_.Wait(&mu_);
-    return sync == Engine::Sync::kYes && failure_.ok() ? sync_failure_ : failure_;
+    return failure_;
+  }
+  absl::Status sync_failure() {
+    MutexLock lock(&mu_);
+    return sync_failure_;
   }
 
   MemoryEngine memory_;

@@ -356,13 +356,32 @@ TEST_P(ConformanceTest, AppendsThatWaitForASlowDiskShareItsSync) {
   session.Append({1, "x"}, Durability::kSync, acknowledged.Of(1));
   ASSERT_TRUE(rig_->faults().AwaitHeldSync());
   for (int i = 2; i <= 40; ++i) session.Append({i, "x"}, Durability::kSync, acknowledged.Of(i));
-  EXPECT_THAT(acknowledged.Await(0), IsEmpty()) << "nothing is acknowledged before it is on disk";
+  session.Append({41, "x"}, Durability::kAsync, acknowledged.Of(41));
+  EXPECT_THAT(acknowledged.AwaitSuccesses(1), ElementsAre(41)) << "others wait until they are on disk";
   EXPECT_EQ(session.durable_revision(), 0);
-  EXPECT_EQ(session.last_revision(), 40);
+  EXPECT_EQ(session.last_revision(), 41);
   rig_->faults().Release();
-  EXPECT_EQ(acknowledged.AwaitSuccesses(40).size(), 40u);
-  EXPECT_EQ(session.durable_revision(), 40);
+  EXPECT_EQ(acknowledged.AwaitSuccesses(41).size(), 41u);
+  EXPECT_EQ(session.durable_revision(), 41);
   EXPECT_EQ(rig_->faults().num_syncs(), before + 2);
+}
+
+TEST_P(ConformanceTest, WhatIsWrittenDuringASyncMayBeLostAndWhatWasBeforeMayNot) {
+  SessionStore& session = Create("part");
+  Acknowledgements acknowledged;
+  rig_->faults().Hold();
+  session.Append({1, "kept"}, Durability::kSync, acknowledged.Of(1));
+  ASSERT_TRUE(rig_->faults().AwaitHeldSync());
+  EXPECT_TRUE(AppendNow(session, 2, "lost", Durability::kAsync).ok()) << "though a sync hangs";
+  rig_->faults().Release();
+  EXPECT_THAT(acknowledged.AwaitSuccesses(1), ElementsAre(1));
+  EXPECT_EQ(session.durable_revision(), 1);
+  rig_->faults().Set(Fault::kFailedSync);  // of the store's end
+  session_.reset();
+  store_.reset();
+  rig_->LosePower();
+  rig_->faults().Set(Fault::kNone);
+  EXPECT_THAT(RecordsAfter(ReopenNamed("part"), 0), ElementsAre(Pair(1, "kept")));
 }
 
 TEST_P(ConformanceTest, LossOfPowerTakesNothingThatWasSynced) {

@@ -48,7 +48,8 @@ class DamageTest : public ::testing::Test {
   void Tamper(EngineBatch batch) {
     const auto engine = OpenRocksDb({directory_.path()});
     ASSERT_EQ(engine.status(), absl::OkStatus());
-    EXPECT_EQ((*engine)->Write(batch, Engine::Sync::kYes), absl::OkStatus());
+    EXPECT_EQ((*engine)->Write(batch), absl::OkStatus());
+    EXPECT_EQ((*engine)->Sync(), absl::OkStatus());
   }
   std::string Stored(const std::string& key) {
     const auto engine = OpenRocksDb({directory_.path()});

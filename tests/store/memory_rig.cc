@@ -1,4 +1,4 @@
-#include <iterator>
+#include <deque>
 #include <utility>
 #include <vector>
 
@@ -15,9 +15,15 @@ constexpr char kAfterLastKey[] = "\xff";
 
 /// What a process sees of a medium, and what of that has been synced.
 struct Medium {
+  void ForgetNotSynced() {
+    MutexLock lock(&mu);
+    not_synced.clear();
+  }
+
   std::unique_ptr<MemoryEngine> seen = std::make_unique<MemoryEngine>();
   MemoryEngine synced;
-  std::vector<EngineBatch> not_synced;
+  Mutex mu;
+  std::deque<EngineBatch> not_synced ABSL_GUARDED_BY(mu);
 };
 
 /// An engine on a Medium that outlives it.
@@ -25,13 +31,25 @@ class FaultyEngine final : public Engine {
  public:
   FaultyEngine(Medium* medium, FaultSwitch* faults) : medium_(medium), faults_(faults) {}
 
-  absl::Status Write(const EngineBatch& batch, Sync sync) override {
+  absl::Status Write(const EngineBatch& batch) override {
     const Fault fault = faults_->fault();
     if (fault == Fault::kFullDisk) return StoreFull("injected");
     if (fault == Fault::kFailedWrite || fault == Fault::kTornWrite) return StoreFailed("injected");
+    MutexLock lock(&medium_->mu);
     medium_->not_synced.push_back(batch);
-    (void)medium_->seen->Write(batch, Sync::kNo);
-    return sync == Sync::kYes ? SyncAll() : absl::OkStatus();
+    return medium_->seen->Write(batch);
+  }
+
+  absl::Status Sync() override {
+    const size_t num_writes = NumNotSynced();  // what is written from here on is not on disk
+    faults_->OnSync();
+    if (faults_->fault() == Fault::kFailedSync) return StoreFailed("injected");
+    MutexLock lock(&medium_->mu);
+    for (size_t i = 0; i < num_writes; ++i) {
+      (void)medium_->synced.Write(medium_->not_synced.front());
+      medium_->not_synced.pop_front();
+    }
+    return absl::OkStatus();
   }
 
   absl::StatusOr<absl::optional<std::string>> Get(absl::string_view key) const override {
@@ -46,12 +64,9 @@ class FaultyEngine final : public Engine {
   }
 
  private:
-  absl::Status SyncAll() {
-    faults_->OnSync();
-    if (faults_->fault() == Fault::kFailedSync) return StoreFailed("injected");
-    for (const EngineBatch& batch : medium_->not_synced) (void)medium_->synced.Write(batch, Sync::kNo);
-    medium_->not_synced.clear();
-    return absl::OkStatus();
+  size_t NumNotSynced() const {
+    MutexLock lock(&medium_->mu);
+    return medium_->not_synced.size();
   }
 
   Medium* const medium_;
@@ -66,13 +81,13 @@ class MemoryRig final : public StoreRig {
 
   void LosePower() override {
     medium_.seen = std::make_unique<MemoryEngine>();
-    medium_.not_synced.clear();
+    medium_.ForgetNotSynced();
     EngineBatch all;
     (void)medium_.synced.Scan(kFirstKey, kAfterLastKey, [&](absl::string_view key, absl::string_view value) {
       all.Put(std::string(key), std::string(value));
       return absl::OkStatus();
     });
-    (void)medium_.seen->Write(all, Engine::Sync::kNo);
+    (void)medium_.seen->Write(all);
   }
 
   void FlipBit(std::mt19937& random) override {
@@ -85,7 +100,7 @@ class MemoryRig final : public StoreRig {
     value[random() % value.size()] ^= 1 << random() % 8;
     EngineBatch flipped;
     flipped.Put(std::move(key), std::move(value));
-    (void)medium_.seen->Write(flipped, Engine::Sync::kNo);
+    (void)medium_.seen->Write(flipped);
   }
 
  private:

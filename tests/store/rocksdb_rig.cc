@@ -2,12 +2,14 @@
 #include <rocksdb/file_system.h>
 
 #include <algorithm>
+#include <atomic>
 #include <filesystem>
 #include <fstream>
 #include <map>
 #include <utility>
 #include <vector>
 
+#include "absl/functional/function_ref.h"
 #include "absl/strings/match.h"
 #include "server/store/local_store.h"
 #include "server/store/rocksdb_engine.h"
@@ -65,24 +67,27 @@ class FaultyLog final : public rocksdb::FSWritableFileOwnerWrapper {
   }
 
   rocksdb::IOStatus Sync(const rocksdb::IOOptions& options, rocksdb::IODebugContext* dbg) override {
-    return Synced(FSWritableFileOwnerWrapper::Sync(options, dbg));
+    return Synced([&] { return FSWritableFileOwnerWrapper::Sync(options, dbg); });
   }
   rocksdb::IOStatus Fsync(const rocksdb::IOOptions& options, rocksdb::IODebugContext* dbg) override {
-    return Synced(FSWritableFileOwnerWrapper::Fsync(options, dbg));
+    return Synced([&] { return FSWritableFileOwnerWrapper::Fsync(options, dbg); });
   }
 
  private:
-  rocksdb::IOStatus Synced(rocksdb::IOStatus status) {
+  // What is appended while it syncs is not on disk.
+  rocksdb::IOStatus Synced(absl::FunctionRef<rocksdb::IOStatus()> sync) {
+    const uint64_t size = size_;
     faults_->OnSync();
     if (faults_->fault() == Fault::kFailedSync) return rocksdb::IOStatus::IOError("injected");
-    if (status.ok()) synced_->Set(path_, size_);
+    const rocksdb::IOStatus status = sync();
+    if (status.ok()) synced_->Set(path_, size);
     return status;
   }
 
   const std::string path_;
   FaultSwitch* const faults_;
   SyncedSizes* const synced_;
-  uint64_t size_ = 0;
+  std::atomic<uint64_t> size_{0};
 };
 
 class FaultyFileSystem final : public rocksdb::FileSystemWrapper {
