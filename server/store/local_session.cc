@@ -198,11 +198,27 @@ absl::Status LocalSession::DropCheckpoint(uint64_t number) {
 absl::Status LocalSession::DropNow(uint64_t number) {
   DYNMESH_RETURN_IF_ERROR(LoadTable());
   if (!table_->Contains(number) || number == table_->last_number()) return CheckpointNotFound(number);
-  EngineBatch batch;
-  AddDrop(owned_.id(), number, *table_, batch);
-  AwaitedWrite write(std::move(batch), Durability::kAsync);
+  const std::vector<layout::PageVersion> pages = table_->Remove(number);
+  EngineBatch manifest;
+  manifest.Delete(layout::ManifestKey(owned_.id(), number));
+  AwaitedWrite write(std::move(manifest), Durability::kAsync);
   owned_.EnqueueBackground(std::move(write.write));
-  return write.Wait();
+  DYNMESH_RETURN_IF_ERROR(write.Wait());
+  return DeletePages(pages);
+}
+
+// A part at a time, so that nobody waits for all. What a crash leaves the next owner finds.
+absl::Status LocalSession::DeletePages(const std::vector<layout::PageVersion>& pages) {
+  constexpr size_t kPagesAtOnce = 128;
+  for (size_t begin = 0; begin < pages.size(); begin += kPagesAtOnce) {
+    Committer::Write write;
+    for (size_t i = begin; i < std::min(begin + kPagesAtOnce, pages.size()); ++i) {
+      write.batch.Delete(layout::PageKeyOf(owned_.id(), pages[i].page, pages[i].checkpoint));
+    }
+    DYNMESH_RETURN_IF_ERROR(owned_.AwaitRoom());
+    owned_.EnqueueBackground(std::move(write));
+  }
+  return absl::OkStatus();
 }
 
 absl::Status LocalSession::TrimRecords(int64_t revision, absl::Span<const RecordRange> kept) {

@@ -19,7 +19,7 @@ namespace dynmesh {
 
 /// How far a session has come.
 struct SessionProgress {
-  /// On the committer's thread: `revision` is on disk, or it never will be.
+  /// On the committer's threads, one at a time: `revision` is on disk, or it never will be.
   void SetDurable(int64_t revision, const absl::Status& status) {
     if (status.ok() && revision <= durable) return;
     if (status.ok()) durable = revision;
@@ -85,6 +85,7 @@ class LocalSession final : public SessionStore {
   void KeepTable(CheckpointTable table);
   bool HasTable();
   absl::Status DropNow(uint64_t number);
+  absl::Status DeletePages(const std::vector<layout::PageVersion>& pages);
   absl::Status Named(const absl::Status& status) const;
 
   const OwnedSession owned_;

@@ -59,7 +59,7 @@ class UnloadingConcurrencyTest : public ::testing::Test {
 
   Daemon daemon_{{},
                  *LocalStore::Open(std::make_unique<MemoryEngine>()),
-                 {.checkpoint_bytes = 20'000, .kept_records = 10'000}};
+                 {.checkpoint_bytes = 20'000, .kept_answers = {10'000, 64 << 20}}};
   std::atomic<bool> stop_{false};
   std::atomic<int64_t> num_unloaded_{0};
   std::thread unloader_{[this] {

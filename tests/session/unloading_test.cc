@@ -452,7 +452,7 @@ TEST_F(UnloadingTest, NothingIsUnloadedWhileTheDaemonDrains) {
 /// The revision of the checkpoint that is on the medium.
 int64_t LastCheckpoint(Medium& medium) {
   const std::unique_ptr<Store> store = medium.Open();
-  return (*(*store->OpenSession("mesh"))->FindCheckpoint())->revision;
+  return (*store->OpenSession("mesh"))->ListCheckpoints()->back().revision;
 }
 
 TEST_F(UnloadingTest, ACheckpointComesFirstWhereThereIsMuchLog) {
