@@ -161,8 +161,6 @@ void ImportReactor::Build() {
     DYNMESH_RETURN_IF_ERROR(lease_.Grow(importer_->num_slot_bytes()));  // before anything is changed
     DYNMESH_ASSIGN_OR_RETURN(answer_, importer_->Finish(*this));
     FromImportOutcome(*answer_.outcome, result_.mutable_result());
-    // The outcome describes the mesh as it was before it was stored.
-    result_.mutable_result()->mutable_session()->set_durable_revision(importer_->durable_revision());
     return absl::OkStatus();
   });
   importer_ = nullptr;  // leaves the gate before the peer knows that it may come again

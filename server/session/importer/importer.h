@@ -96,7 +96,6 @@ class Importer {
     return options_.slot_order == SlotOrder::kCaller ? 0 : num_received() * sizeof(Slot);
   }
   uint64_t num_announced() const { return options_.num_vertices + options_.num_elements; }
-  int64_t durable_revision() const { return session_->durable_revision(); }
 
   /// Errors: INVALID_ARGUMENT COUNT_MISMATCH and those of MeshBuilder; FAILED_PRECONDITION SESSION_NOT_EMPTY
   /// when somebody was faster; CANCELLED. To be called once, from a heavy executor.
