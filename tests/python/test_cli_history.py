@@ -216,7 +216,8 @@ def test_wrong_usage_is_told(line, message, capsys):
 
 
 def test_help_is_there_for_all_of_it(capsys):
-    for command in ("history", "rollback", "fork", "set-retention", "snapshot create", "snapshot list", "snapshot delete"):
+    snapshots = [f"snapshot {action}" for action in ("create", "list", "delete")]
+    for command in ("history", "rollback", "fork", "set-retention", *snapshots):
         with pytest.raises(SystemExit) as ended:
             main([*command.split(), "--help"])
         assert ended.value.code == 0 and f"usage: dynmesh {command}" in capsys.readouterr().out

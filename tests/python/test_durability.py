@@ -12,7 +12,8 @@ from waiting import await_serving, await_state
 def test_a_session_is_there_again_with_its_ids(tmp_path):
     with dynmesh.launch(data_dir=tmp_path) as daemon:
         session = daemon.client.create_session("part")
-        session.import_mesh(two_tets(), progress=False)
+        imported = session.import_mesh(two_tets(), progress=False)
+        assert (imported.info.revision, imported.info.durable_revision) == (1, 1)
         with session.edit() as batch:
             batch.split_edges([0])
         before = session.info()

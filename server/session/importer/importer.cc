@@ -133,6 +133,7 @@ absl::StatusOr<ImportAnswer> Importer::BuildAndAdopt(ImportMonitor& monitor, uin
     outcome->info.etag.clear();
   }
   outcome->revision = outcome->info.revision;
+  outcome->info.durable_revision = outcome->revision;  // it is told once it is there
   if (monitor.cancelled()) return CallCancelled();
   if (!options_.validate_only) {
     DYNMESH_RETURN_IF_ERROR(session_->Adopt(mesh, RequestOf(fingerprint, *outcome)));

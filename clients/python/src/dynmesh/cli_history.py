@@ -164,8 +164,9 @@ def _delete_snapshot(session: Session, args: argparse.Namespace) -> tuple[Any, s
 
 
 def _revision_row(revision: Revision) -> str:
-    made = f"{revision.revision:9} {revision.commit_time:%Y-%m-%d %H:%M:%S} {revision.kind:11} {revision.size_bytes:10}"
-    return f"{made} {one_line(revision.author):12} {one_line(revision.message)}".rstrip()
+    made = f"{revision.revision:9} {revision.commit_time:%Y-%m-%d %H:%M:%S}"
+    what = f"{revision.kind:11} {revision.size_bytes:10}"
+    return f"{made} {what} {one_line(revision.author):12} {one_line(revision.message)}".rstrip()
 
 
 def _snapshot_row(snapshot: SnapshotInfo) -> str:
