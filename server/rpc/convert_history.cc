@@ -62,9 +62,9 @@ v1::Snapshot FromSnapshot(const Snapshot& snapshot) {
   return message;
 }
 
-void FromRestoration(const HistoryResult& result, int64_t target, v1::RestoreSessionResponse* response) {
+void FromRestoration(const HistoryResult& result, v1::RestoreSessionResponse* response) {
   response->set_revision(result.revision);
-  response->set_target_revision(target);
+  response->set_target_revision(result.target_revision);
   *response->mutable_checksum() = FromChecksum(result.checksum);
   *response->mutable_counts() = FromCounts(ToKindCounts(result.counts));
   response->set_undoable_batches(result.undoable_batches);

@@ -15,7 +15,7 @@ HistoryOptions ToHistoryOptions(const v1::RestoreSessionRequest& request);
 
 v1::Revision FromRevisionInfo(const RevisionInfo& info);
 v1::Snapshot FromSnapshot(const Snapshot& snapshot);
-void FromRestoration(const HistoryResult& result, int64_t target, v1::RestoreSessionResponse* response);
+void FromRestoration(const HistoryResult& result, v1::RestoreSessionResponse* response);
 
 /// The last revision of a page of them.
 std::string ToRevisionToken(int64_t last);

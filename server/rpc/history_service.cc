@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "absl/strings/str_cat.h"
 #include "core/mesh/error.h"
 #include "dynmesh/v1/history.grpc.pb.h"
 #include "server/rpc/convert.h"
@@ -30,13 +31,20 @@ absl::Status Answer(Session& session, const v1::ListRevisionsRequest& request,
   return absl::OkStatus();
 }
 
-/// The revision that a request means.
-template <typename Request>
-absl::StatusOr<int64_t> TargetOf(Session& session, const Request& request, absl::optional<int64_t> revision) {
+absl::Status CheckTargetRevision(int64_t revision) {
+  return revision >= 0 ? absl::OkStatus() : BadField("revision", "the revision is negative");
+}
+
+/// What is to be gone back to, in words: also when the snapshot is there no more, a retry says the same.
+std::string TargetOf(const v1::RestoreSessionRequest& request) {
+  return request.has_snapshot() ? absl::StrCat("snapshot ", request.snapshot())
+                                : absl::StrCat("revision ", request.target_revision());
+}
+
+absl::StatusOr<int64_t> TargetRevisionOf(Session& session, const v1::RestoreSessionRequest& request) {
   if (request.has_snapshot()) return FindSnapshotRevision(session, request.snapshot());
-  if (!revision.has_value()) return kLastRevision;
-  if (*revision < 0) return BadField("revision", "the revision is negative");
-  return *revision;
+  DYNMESH_RETURN_IF_ERROR(CheckTargetRevision(request.target_revision()));
+  return request.target_revision();
 }
 
 absl::Status Answer(Session& session, const v1::RestoreSessionRequest& request, const StopSignal& stop,
@@ -44,15 +52,16 @@ absl::Status Answer(Session& session, const v1::RestoreSessionRequest& request, 
   if (request.target_case() == v1::RestoreSessionRequest::TARGET_NOT_SET) {
     return BadField("target", "neither target_revision nor snapshot says what to go back to");
   }
-  const HistoryOptions options = ToHistoryOptions(request);
+  HistoryOptions options = ToHistoryOptions(request);
+  options.target = TargetOf(request);
   DYNMESH_RETURN_IF_ERROR(CheckNote(options.note));
   DYNMESH_RETURN_IF_ERROR(AwaitLoaded(session));
-  DYNMESH_ASSIGN_OR_RETURN(const int64_t target, TargetOf(session, request, request.target_revision()));
-  DYNMESH_ASSIGN_OR_RETURN(auto result, session.FindRestoration(target, options));
+  DYNMESH_ASSIGN_OR_RETURN(auto result, session.FindRestoration(options));
   if (result == nullptr) {
+    DYNMESH_ASSIGN_OR_RETURN(const int64_t target, TargetRevisionOf(session, request));
     DYNMESH_ASSIGN_OR_RETURN(result, GoBackTo(session, target, options, stop));
   }
-  FromRestoration(*result, target, response);
+  FromRestoration(*result, response);
   return absl::OkStatus();
 }
 
@@ -60,11 +69,14 @@ absl::Status Answer(const ServiceContext& services, Session& source, const v1::F
                     v1::ForkSessionResponse* response) {
   ForkOptions options{request.name(), request.request_id()};
   options.note = ToNote(request.note());
+  options.snapshot = request.snapshot();
   DYNMESH_ASSIGN_OR_RETURN(options.durability, ToDurability(request.durability()));
+  if (request.has_source_revision()) {
+    DYNMESH_RETURN_IF_ERROR(CheckTargetRevision(request.source_revision()));
+    options.revision = request.source_revision();
+  }
+  if (request.has_snapshot() && options.snapshot.empty()) return BadSnapshotName();
   DYNMESH_RETURN_IF_ERROR(AwaitLoaded(source));
-  absl::optional<int64_t> revision;
-  if (request.has_source_revision()) revision = request.source_revision();
-  DYNMESH_ASSIGN_OR_RETURN(options.revision, TargetOf(source, request, revision));
   DYNMESH_ASSIGN_OR_RETURN(const SessionInfo info, Fork(services.registry, source, options));
   *response->mutable_session() = FromSessionInfo(info);
   response->set_revision(info.revision);

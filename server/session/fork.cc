@@ -14,6 +14,7 @@ uint64_t FingerprintOf(const Session& source, const ForkOptions& options) {
   fingerprint.AddString(source.name());
   fingerprint.AddString(options.name);
   fingerprint.AddNumber(options.revision);
+  fingerprint.AddString(options.snapshot);
   fingerprint.AddNumber(static_cast<uint64_t>(options.durability));
   return fingerprint.value();
 }
@@ -28,11 +29,15 @@ absl::StatusOr<SessionInfo> Fork(SessionRegistry& registry, Session& source, con
   DYNMESH_ASSIGN_OR_RETURN(const auto created, registry.FindCreated(options.request_id, fingerprint));
   if (created != nullptr) return *created;
   DYNMESH_RETURN_IF_ERROR(registry.CheckCreation(options.name));  // before the work
+  int64_t revision = options.revision;
+  if (!options.snapshot.empty()) {
+    DYNMESH_ASSIGN_OR_RETURN(revision, FindSnapshotRevision(source, options.snapshot));
+  }
   SessionSeed seed;
   seed.name = options.name;
   seed.settings = source.Settings();
   if (options.durability != SessionDurability::kDefault) seed.settings.durability = options.durability;
-  DYNMESH_ASSIGN_OR_RETURN(RecoveredRevision then, MeshAt(source, options.revision));
+  DYNMESH_ASSIGN_OR_RETURN(RecoveredRevision then, MeshAt(source, revision));
   seed.mesh = std::move(then.mesh);
   seed.commit_time = then.commit_time;
   seed.note = options.note;

@@ -17,6 +17,7 @@ struct ForkOptions {
   std::string name = {};
   std::string request_id = {};
   int64_t revision = kLastRevision;                            ///< of the source
+  std::string snapshot = {};                                   ///< or this one of it
   SessionDurability durability = SessionDurability::kDefault;  ///< kDefault: that of the source
   RevisionNote note = {};
 };

@@ -58,6 +58,7 @@ struct HistoryOptions {
   std::string request_id = {};  ///< as of ApplyOptions
   bool validate_only = false;
   RevisionNote note = {};
+  std::string target = {};  ///< of RestoreTo(): what to go back to, in the words of the request
 };
 
 /// What undoing or redoing did or, for validate_only, would have done.
@@ -68,6 +69,7 @@ struct HistoryResult {
   std::array<uint32_t, kNumEntityKinds> counts = {};
   uint32_t undoable_batches = 0;  ///< after it
   uint32_t redoable_batches = 0;
+  int64_t target_revision = 0;  ///< that RestoreTo() went back to
 };
 
 /// So many elements that operators made can be told of in one answer, which is then some 4 MB.
@@ -262,10 +264,8 @@ class Session : public std::enable_shared_from_this<Session> {
                                                                  const HistoryOptions& options,
                                                                  const StopSignal& stop = StopSignal::Never())
       ABSL_LOCKS_EXCLUDED(mu_);
-  /// What a request to go back to `revision` got, nullptr if there was none. Errors: INVALID_ARGUMENT
-  /// REQUEST_ID_REUSED.
-  absl::StatusOr<std::shared_ptr<const HistoryResult>> FindRestoration(int64_t revision,
-                                                                       const HistoryOptions& options) const
+  /// What such a request got, nullptr if there was none. Errors: INVALID_ARGUMENT REQUEST_ID_REUSED.
+  absl::StatusOr<std::shared_ptr<const HistoryResult>> FindRestoration(const HistoryOptions& options) const
       ABSL_LOCKS_EXCLUDED(mu_);
 
   /// What the import `request_id` gave, nullptr if there was none. Errors: INVALID_ARGUMENT

@@ -26,11 +26,11 @@ uint64_t FingerprintOf(HistoryMove move, const HistoryOptions& options) {
   return fingerprint.value();
 }
 
-uint64_t FingerprintOf(int64_t revision, const HistoryOptions& options) {
+uint64_t FingerprintOfRestoration(const HistoryOptions& options) {
   constexpr uint64_t kRestore = 2;  // beside those of HistoryMove
   Fingerprint fingerprint;
   fingerprint.AddNumber(kRestore);
-  fingerprint.AddNumber(revision);
+  fingerprint.AddString(options.target);
   fingerprint.AddNumber(options.if_revision.has_value());
   fingerprint.AddNumber(options.if_revision.value_or(0));
   return fingerprint.value();
@@ -78,7 +78,7 @@ absl::StatusOr<Session::HistoryAnswerPtr> Session::RestoreTo(const Mesh& then, c
     WriterMutexLock lock(&mu_);
     DYNMESH_RETURN_IF_ERROR(CheckEditable());
     const LoggedRequest request{
-        LoggedCall::kRestore, options.request_id, FingerprintOf(then.revision(), options), {}, options.note};
+        LoggedCall::kRestore, options.request_id, FingerprintOfRestoration(options), {}, options.note};
     answer = AnswerOnce(options, request, [&]() ABSL_NO_THREAD_SAFETY_ANALYSIS {
       return RestoreLocked(then, options, request, stop);
     });
@@ -87,12 +87,11 @@ absl::StatusOr<Session::HistoryAnswerPtr> Session::RestoreTo(const Mesh& then, c
   return answer;
 }
 
-absl::StatusOr<Session::HistoryAnswerPtr> Session::FindRestoration(int64_t revision,
-                                                                   const HistoryOptions& options) const {
+absl::StatusOr<Session::HistoryAnswerPtr> Session::FindRestoration(const HistoryOptions& options) const {
   DYNMESH_RETURN_IF_ERROR(CheckRequestId(options.request_id));
   if (options.request_id.empty() || options.validate_only) return HistoryAnswerPtr();
   ReaderMutexLock lock(&mu_);
-  return history_answers_.Find(options.request_id, FingerprintOf(revision, options));
+  return history_answers_.Find(options.request_id, FingerprintOfRestoration(options));
 }
 
 absl::StatusOr<Session::HistoryAnswerPtr> Session::AnswerOnce(
@@ -137,7 +136,9 @@ absl::StatusOr<Session::HistoryAnswerPtr> Session::RestoreLocked(const Mesh& the
     Committed();
     MakeRoom(mesh_.memory_bytes());
   }
-  return Restored({restored.revision, 0, restored.checksum, restored.counts}, options, request);
+  HistoryResult result{restored.revision, 0, restored.checksum, restored.counts};
+  result.target_revision = then.revision();
+  return Restored(result, options, request);
 }
 
 absl::StatusOr<RestoredBatches> Session::RunRestore(

@@ -243,6 +243,14 @@ TEST_F(RevisionsRpcTest, SnapshotsAreKeptListedAndDeleted) {
   v1::RestoreSessionResponse restored;
   ASSERT_TRUE(Restore(request, &restored).ok());
   EXPECT_EQ(restored.target_revision(), 2);
+  request.set_request_id("back");
+  ASSERT_TRUE(Restore(request, &restored).ok());
+  v1::ForkSessionRequest fork = ForkOf("mesh", "fork");
+  fork.set_snapshot("before");
+  fork.set_request_id("fork");
+  v1::ForkSessionResponse forked;
+  ASSERT_TRUE(Fork(fork, &forked).ok());
+  EXPECT_EQ(forked.revision(), 2);
   v1::DeleteSnapshotRequest deletion;
   deletion.set_session("mesh");
   deletion.set_name("before");
@@ -251,6 +259,11 @@ TEST_F(RevisionsRpcTest, SnapshotsAreKeptListedAndDeleted) {
   EXPECT_TRUE(history().DeleteSnapshot(&first, deletion, &deleted).ok());
   ExpectError(history().DeleteSnapshot(&second, deletion, &deleted), grpc::StatusCode::NOT_FOUND,
               "SNAPSHOT_NOT_FOUND");
+  v1::RestoreSessionResponse again;
+  ASSERT_TRUE(Restore(request, &again).ok()) << "a retry needs no snapshot";
+  EXPECT_EQ(again.revision(), restored.revision());
+  EXPECT_EQ(again.target_revision(), 2);
+  EXPECT_TRUE(Fork(fork, &forked).ok());
 }
 
 TEST_F(RevisionsRpcTest, RetentionIsASettingThatCanBeChanged) {

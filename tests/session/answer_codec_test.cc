@@ -92,11 +92,12 @@ TEST(AnswerCodecTest, ARepairAndAMoveInHistoryAreTheSameAgain) {
   EXPECT_EQ(EncodeAnswer(*outcome), repair);
   EXPECT_EQ(outcome->reports[0].Count(RepairFinding::kMerged), 2u);
   EXPECT_EQ(outcome->reports[0].Of(RepairFinding::kFilled).entities[0], (EntityId{EntityKind::kEdge, 7}));
-  const std::string history = EncodeAnswer(HistoryResult{8, 2, {}, {1, 2, 3, 4}, 5, 6});
+  const std::string history = EncodeAnswer(HistoryResult{8, 2, {}, {1, 2, 3, 4}, 5, 6, 7});
   const auto moved = DecodeHistoryResult(history);
   ASSERT_TRUE(moved.ok()) << moved.status();
   EXPECT_EQ(EncodeAnswer(*moved), history);
   EXPECT_EQ(moved->redoable_batches, 6u);
+  EXPECT_EQ(moved->target_revision, 7);
 }
 
 TEST(AnswerCodecTest, DamagedAnswersDoNoHarm) {

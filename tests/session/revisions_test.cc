@@ -108,16 +108,17 @@ TEST_F(RevisionsTest, ARetryOfGoingBackGetsTheFirstAnswerAlsoAfterARestart) {
   SessionPtr session = daemon_->NewSession();
   EditAtRandom(*session, 10);
   const int64_t target = copies_.begin()->first;
-  const HistoryOptions options{.request_id = "back", .note = {"ann", "undo the cut"}};
-  EXPECT_EQ(*session->FindRestoration(target, options), nullptr);
+  const HistoryOptions options{.request_id = "back", .note = {"ann", "undo the cut"}, .target = "first"};
+  const HistoryOptions other{.request_id = "back", .target = "second"};
+  EXPECT_EQ(*session->FindRestoration(options), nullptr);
   const HistoryResult first = **session->RestoreTo(copies_.at(target), options);
   session = nullptr;
   for (int restarts = 0; restarts < 2; ++restarts) {
     session = Find();
-    EXPECT_EQ((*session->FindRestoration(target, options))->revision, first.revision);
+    EXPECT_EQ((*session->FindRestoration(options))->revision, first.revision);
     EXPECT_EQ((*session->RestoreTo(copies_.at(target), options))->revision, first.revision);
     EXPECT_EQ(session->revision(), first.revision);
-    EXPECT_EQ(RefusalOf(session->FindRestoration(target + 1, options)),
+    EXPECT_EQ(RefusalOf(session->FindRestoration(other)),
               (Refusal{absl::StatusCode::kInvalidArgument, reason::kRequestIdReused}));
     session = nullptr;
     Restart();

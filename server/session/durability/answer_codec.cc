@@ -97,6 +97,7 @@ std::string EncodeAnswer(const HistoryResult& result) {
   out.State(result.checksum, result.counts);
   out.Fixed(result.undoable_batches);
   out.Fixed(result.redoable_batches);
+  out.Fixed(result.target_revision);
   return std::move(out).Take();
 }
 
@@ -108,6 +109,7 @@ absl::StatusOr<HistoryResult> DecodeHistoryResult(absl::string_view bytes) {
   in.State(result.checksum, result.counts);
   result.undoable_batches = in.Fixed<uint32_t>();
   result.redoable_batches = in.Fixed<uint32_t>();
+  result.target_revision = in.Fixed<int64_t>();
   return in.End(result);
 }
 
