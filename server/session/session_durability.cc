@@ -1,5 +1,6 @@
 // What a session does so that it outlives the process: its log, loading, checkpoints.
 
+#include <thread>
 #include <utility>
 
 #include "core/mesh/error.h"
@@ -180,6 +181,8 @@ void Session::StartCheckpoint() {
 void Session::WriteCheckpoint() {
   const absl::Status written = CatchExceptions([&] {
     return log_->WriteCheckpoint([this](absl::FunctionRef<absl::Status(const Mesh&, absl::Time)> fn) {
+      std::this_thread::yield();  // who holds a turn had better not lose the processor
+      const AccessGrant turn = access().Acquire(AccessMode::kRead);  // so that edits come in between
       return Read([&](const SessionView& view) { return fn(view.mesh, view.commit_time); });
     });
   });

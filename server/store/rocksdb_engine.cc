@@ -191,6 +191,9 @@ absl::StatusOr<std::unique_ptr<Engine>> OpenRocksDb(const RocksDbOptions& option
   DYNMESH_ASSIGN_OR_RETURN(std::unique_ptr<DirectoryLock> lock, DirectoryLock::Take(options.directory));
   DYNMESH_ASSIGN_OR_RETURN(std::unique_ptr<SyncedMark> mark,
                            SyncedMark::Open(options.directory + "/dynmesh.synced"));
+  // Compaction gives way to whoever edits; a failure to ask for that costs nothing.
+  rocksdb::Env* const env = options.env == nullptr ? rocksdb::Env::Default() : options.env;
+  (void)env->LowerThreadPoolCPUPriority(rocksdb::Env::LOW, rocksdb::CpuPriority::kLow);
   rocksdb::DB* db = nullptr;
   const rocksdb::Status opened =
       rocksdb::DB::Open(DatabaseOptions(options.env), options.directory + "/rocksdb", &db);

@@ -15,8 +15,8 @@
 namespace dynmesh {
 namespace {
 
-/// Pages that are encoded before edits get their turn again: about a millisecond.
-constexpr size_t kPagesAtOnce = 32;
+/// Pages that are encoded before edits get their turn again: less than half a millisecond.
+constexpr size_t kPagesAtOnce = 8;
 
 /// Leaves room for the request and its answer.
 constexpr size_t kMaxBatchBytes = kMaxStoredBytes / 2;
