@@ -48,7 +48,7 @@ ABSL_FLAG(uint64_t, max_loaded_bytes, dynmesh::ServerOptions().max_loaded_bytes,
           "nobody uses are unloaded. 0: however much");
 ABSL_FLAG(
     uint32_t, retain_revisions, dynmesh::ServerOptions().retention.max_revisions,
-    "Last revisions of a session in data_dir that can be gone back to; 0: all. A session can say otherwise");
+    "Last revisions of a session in data_dir that can be gone back to; 0: all. A session can ask for fewer");
 ABSL_FLAG(absl::Duration, retain_age, dynmesh::ServerOptions().retention.max_age,
           "The same by their age; 0: of any age");
 ABSL_FLAG(uint64_t, retain_bytes, dynmesh::ServerOptions().retention.max_bytes,

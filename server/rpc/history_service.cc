@@ -10,6 +10,7 @@
 #include "server/rpc/convert_history.h"
 #include "server/rpc/convert_sessions.h"
 #include "server/rpc/unary.h"
+#include "server/session/budget.h"
 #include "server/session/fork.h"
 #include "server/session/revisions.h"
 #include "server/session/session_errors.h"
@@ -17,15 +18,34 @@
 namespace dynmesh {
 namespace {
 
+// A page ends early when its revisions hold this much.
+constexpr size_t kMaxListBytes = size_t{1} << 20;
+
+/// Room for a copy of the session's mesh. Errors: RESOURCE_EXHAUSTED LIMIT_EXCEEDED (max_backup_bytes).
+absl::StatusOr<Lease> RoomForCopy(const ServiceContext& services, Session& session) {
+  Lease room(services.registry.backup_budget());
+  DYNMESH_ASSIGN_OR_RETURN(const uint64_t bytes, session.ReadAs<uint64_t>([](const SessionView& view) {
+    return absl::StatusOr<uint64_t>(view.mesh.memory_bytes());
+  }));
+  DYNMESH_RETURN_IF_ERROR(room.Grow(bytes));
+  return room;
+}
+
 absl::Status Answer(Session& session, const v1::ListRevisionsRequest& request,
                     v1::ListRevisionsResponse* response) {
   DYNMESH_ASSIGN_OR_RETURN(const int page_size, ToPageSize(request.page_size()));
   DYNMESH_ASSIGN_OR_RETURN(const int64_t before, FromRevisionToken(request.page_token()));
   DYNMESH_RETURN_IF_ERROR(AwaitLoaded(session));
   DYNMESH_ASSIGN_OR_RETURN(const RevisionList list, ListRevisions(session, before, page_size));
-  for (const RevisionInfo& info : list.revisions) *response->add_revisions() = FromRevisionInfo(info);
-  const bool is_last = list.revisions.empty() || list.revisions.back().revision <= list.oldest;
-  if (!is_last) response->set_next_page_token(ToRevisionToken(list.revisions.back().revision));
+  size_t bytes = 0;
+  int64_t last = list.oldest;
+  for (const RevisionInfo& info : list.revisions) {
+    if (bytes > kMaxListBytes) break;
+    *response->add_revisions() = FromRevisionInfo(info);
+    bytes += response->revisions().rbegin()->ByteSizeLong();
+    last = info.revision;
+  }
+  if (last > list.oldest) response->set_next_page_token(ToRevisionToken(last));
   response->set_oldest_revision(list.oldest);
   response->set_revision(list.last);
   return absl::OkStatus();
@@ -47,7 +67,8 @@ absl::StatusOr<int64_t> TargetRevisionOf(Session& session, const v1::RestoreSess
   return request.target_revision();
 }
 
-absl::Status Answer(Session& session, const v1::RestoreSessionRequest& request, const StopSignal& stop,
+absl::Status Answer(const ServiceContext& services, Session& session,
+                    const v1::RestoreSessionRequest& request, const StopSignal& stop,
                     v1::RestoreSessionResponse* response) {
   if (request.target_case() == v1::RestoreSessionRequest::TARGET_NOT_SET) {
     return BadField("target", "neither target_revision nor snapshot says what to go back to");
@@ -59,6 +80,7 @@ absl::Status Answer(Session& session, const v1::RestoreSessionRequest& request, 
   DYNMESH_ASSIGN_OR_RETURN(auto result, session.FindRestoration(options));
   if (result == nullptr) {
     DYNMESH_ASSIGN_OR_RETURN(const int64_t target, TargetRevisionOf(session, request));
+    DYNMESH_ASSIGN_OR_RETURN(const Lease room, RoomForCopy(services, session));
     DYNMESH_ASSIGN_OR_RETURN(result, GoBackTo(session, target, options, stop));
   }
   FromRestoration(*result, response);
@@ -77,6 +99,7 @@ absl::Status Answer(const ServiceContext& services, Session& source, const v1::F
   }
   if (request.has_snapshot() && options.snapshot.empty()) return BadSnapshotName();
   DYNMESH_RETURN_IF_ERROR(AwaitLoaded(source));
+  DYNMESH_ASSIGN_OR_RETURN(const Lease room, RoomForCopy(services, source));
   DYNMESH_ASSIGN_OR_RETURN(const SessionInfo info, Fork(services.registry, source, options));
   *response->mutable_session() = FromSessionInfo(info);
   response->set_revision(info.revision);
@@ -125,9 +148,9 @@ class HistoryService final : public v1::HistoryService::CallbackService {
                                            v1::RestoreSessionResponse* response) override {
     constexpr char kRpc[] = "RestoreSession";
     return RunOutOfTurn(
-        {kRpc, context, services_}, request->session(),
-        [context, request, response](const SessionPtr& session) {
-          return Answer(*session, *request, CallStop(context), response);
+        {kRpc, context, services_}, request,
+        [this, context, request, response](const SessionPtr& session) {
+          return Answer(services_, *session, *request, CallStop(context), response);
         },
         AnswerAcknowledged<v1::RestoreSessionResponse>{kRpc, response});
   }
@@ -137,7 +160,7 @@ class HistoryService final : public v1::HistoryService::CallbackService {
                                         v1::ForkSessionResponse* response) override {
     constexpr char kRpc[] = "ForkSession";
     return RunOutOfTurn(
-        {kRpc, context, services_}, request->session(),
+        {kRpc, context, services_}, request,
         [this, request, response](const SessionPtr& session) {
           return Answer(services_, *session, *request, response);
         },
@@ -166,7 +189,7 @@ class HistoryService final : public v1::HistoryService::CallbackService {
   template <typename Request, typename Response>
   static grpc::ServerUnaryReactor* Run(const UnaryCall& call, const Request* request, Response* response) {
     return RunOutOfTurn(
-        call, request->session(),
+        call, request,
         [request, response](const SessionPtr& session) { return Answer(*session, *request, response); },
         AnswerNow{call.rpc});
   }

@@ -75,19 +75,21 @@ grpc::ServerUnaryReactor* RunInTurn(const UnaryCall& call, const std::string& se
   return reactor;
 }
 
-/// Runs fn(session) on a heavy thread, whose turn at the session of that name it is not, then end(CallEnd).
-/// For what waits for the disk.
-template <typename Fn, typename End>
-grpc::ServerUnaryReactor* RunOutOfTurn(const UnaryCall& call, const std::string& session_name, Fn fn,
-                                       End end) {
+/// Runs fn(session) on a heavy thread, whose turn at the request's session it is not, then end(CallEnd). For
+/// what waits for the disk.
+template <typename Request, typename Fn, typename End>
+grpc::ServerUnaryReactor* RunOutOfTurn(const UnaryCall& call, const Request* request, Fn fn, End end) {
   grpc::ServerUnaryReactor* reactor = call.context->DefaultReactor();
-  const absl::StatusOr<SessionPtr> session = call.services.registry.Find(session_name);
+  const absl::Status size = CheckMessageSize(*request, call.services.limits());
+  const absl::StatusOr<SessionPtr> session =
+      size.ok() ? call.services.registry.Find(request->session()) : size;
   absl::Status posted = session.status();
   if (session.ok()) {
-    posted = call.services.heavy().TryPost([call, reactor, session = *session, fn = std::move(fn), end] {
+    auto task = [call, reactor, session = *session, fn = std::move(fn), end] {
       const absl::Status stopped = CallStop(call.context).Check();
       end(CallEnd{reactor, session, stopped.ok() ? CatchExceptions([&] { return fn(session); }) : stopped});
-    });
+    };
+    posted = call.services.heavy().TryPost(std::move(task), request->ByteSizeLong());
   }
   if (!posted.ok()) reactor->Finish(LoggedStatus(call.rpc, posted));
   return reactor;

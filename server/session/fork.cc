@@ -26,7 +26,8 @@ absl::StatusOr<SessionInfo> Fork(SessionRegistry& registry, Session& source, con
   DYNMESH_RETURN_IF_ERROR(CheckRequestId(options.request_id));
   DYNMESH_RETURN_IF_ERROR(CheckNote(options.note));
   const uint64_t fingerprint = FingerprintOf(source, options);
-  DYNMESH_ASSIGN_OR_RETURN(const auto created, registry.FindCreated(options.request_id, fingerprint));
+  DYNMESH_ASSIGN_OR_RETURN(const auto created,
+                           registry.FindCreated(options.name, options.request_id, fingerprint));
   if (created != nullptr) return *created;
   DYNMESH_RETURN_IF_ERROR(registry.CheckCreation(options.name));  // before the work
   int64_t revision = options.revision;

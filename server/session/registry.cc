@@ -129,10 +129,12 @@ absl::StatusOr<SessionInfo> SessionRegistry::DescribeSeed(SessionSeed& seed) con
   return info;
 }
 
-absl::StatusOr<std::shared_ptr<const SessionInfo>> SessionRegistry::FindCreated(const std::string& request_id,
+absl::StatusOr<std::shared_ptr<const SessionInfo>> SessionRegistry::FindCreated(const std::string& name,
+                                                                                const std::string& request_id,
                                                                                 uint64_t fingerprint) {
   if (request_id.empty()) return std::shared_ptr<const SessionInfo>();
   MutexLock lock(&create_mu_);
+  while (creating_.contains(name)) created_one_.Wait(&create_mu_);
   return created_.Find(request_id, fingerprint);
 }
 
@@ -155,28 +157,29 @@ absl::StatusOr<SessionRegistry::NewSession> SessionRegistry::MakeSession(Session
   options.create_request_id = seed.request_id;
   options.create_fingerprint = seed.fingerprint;
   options.create_revision = seed.mesh.revision();
-  std::unique_ptr<SessionLog> log;
-  if (seed.settings.durability != SessionDurability::kNone) {
-    DYNMESH_ASSIGN_OR_RETURN(log, MakeLog(seed, IdentityOf(options)));
-  }
+  if (seed.settings.durability == SessionDurability::kNone) return BeginSession(seed, options, nullptr);
+  if (store_ == nullptr) return NoStore();
+  DYNMESH_RETURN_IF_ERROR(store_->CreateSession(seed.name));
+  auto made = CatchExceptions([&]() -> absl::StatusOr<NewSession> {
+    DYNMESH_ASSIGN_OR_RETURN(std::unique_ptr<SessionLog> log, StoreSeed(seed, IdentityOf(options)));
+    return BeginSession(seed, options, std::move(log));
+  });
+  if (!made.ok()) store_->DeleteSession(seed.name).IgnoreError();
+  return made;
+}
+
+absl::StatusOr<SessionRegistry::NewSession> SessionRegistry::BeginSession(SessionSeed& seed,
+                                                                          const Session::Options& options,
+                                                                          std::unique_ptr<SessionLog> log) {
   auto session = std::make_shared<Session>(options, std::move(log));
   session->BeginWith(std::move(seed.mesh), seed.commit_time);
   DYNMESH_ASSIGN_OR_RETURN(SessionInfo info, session->Info());
   return NewSession{std::move(session), std::move(info)};
 }
 
-absl::StatusOr<std::unique_ptr<SessionLog>> SessionRegistry::MakeLog(const SessionSeed& seed,
-                                                                     const SessionIdentity& identity) {
-  if (store_ == nullptr) return NoStore();
-  auto log = CatchExceptions([&] { return StoreSeed(seed, identity); });
-  if (!log.ok() && !absl::IsAlreadyExists(log.status())) store_->DeleteSession(seed.name).IgnoreError();
-  return log;
-}
-
 /// The identity comes last: a session without one was never created.
 absl::StatusOr<std::unique_ptr<SessionLog>> SessionRegistry::StoreSeed(const SessionSeed& seed,
                                                                        const SessionIdentity& identity) {
-  DYNMESH_RETURN_IF_ERROR(store_->CreateSession(seed.name));
   DYNMESH_ASSIGN_OR_RETURN(std::unique_ptr<SessionStore> store, store_->OpenSession(seed.name));
   std::unique_ptr<SessionLog> log = LogFor(std::move(store), identity.settings);
   DYNMESH_RETURN_IF_ERROR(
@@ -235,7 +238,9 @@ absl::StatusOr<SessionPtr> SessionRegistry::OpenStored(const std::string& name) 
                                                  Session::Content::kStored);
   if (!identity.request_id.empty()) {
     SessionInfo created = session->Outline();
-    created.state = SessionState::kLoaded;
+    // What it began with is not known any more, unless that was nothing.
+    if (identity.create_revision == 0) created.state = SessionState::kLoaded;
+    created.etag.clear();
     created.revision = created.durable_revision = identity.create_revision;
     created_.Remember(identity.request_id, identity.fingerprint,
                       std::make_shared<const SessionInfo>(std::move(created)), sizeof(created));

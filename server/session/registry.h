@@ -93,9 +93,10 @@ class SessionRegistry {
   /// max_session_bytes) when the mesh is more than a session may hold here. Cost: storing all pages.
   absl::StatusOr<SessionInfo> CreateFrom(SessionSeed seed);
 
-  /// What a request that created a session got, nullptr if there was none. Errors: INVALID_ARGUMENT
-  /// REQUEST_ID_REUSED. May wait for a creation.
-  absl::StatusOr<std::shared_ptr<const SessionInfo>> FindCreated(const std::string& request_id,
+  /// What a request that created a session of that name got, nullptr if there was none. Errors:
+  /// INVALID_ARGUMENT REQUEST_ID_REUSED. Waits for a creation of the name that is under way.
+  absl::StatusOr<std::shared_ptr<const SessionInfo>> FindCreated(const std::string& name,
+                                                                 const std::string& request_id,
                                                                  uint64_t fingerprint)
       ABSL_LOCKS_EXCLUDED(create_mu_);
 
@@ -163,8 +164,8 @@ class SessionRegistry {
       ABSL_LOCKS_EXCLUDED(create_mu_, mu_);
   absl::Status CheckRoom(const std::string& name, size_t num_creating) const ABSL_LOCKS_EXCLUDED(mu_);
   absl::StatusOr<NewSession> MakeSession(SessionSeed& seed);
-  absl::StatusOr<std::unique_ptr<SessionLog>> MakeLog(const SessionSeed& seed,
-                                                      const SessionIdentity& identity);
+  absl::StatusOr<NewSession> BeginSession(SessionSeed& seed, const Session::Options& options,
+                                          std::unique_ptr<SessionLog> log);
   absl::StatusOr<std::unique_ptr<SessionLog>> StoreSeed(const SessionSeed& seed,
                                                         const SessionIdentity& identity);
   absl::StatusOr<SessionPtr> OpenStored(const std::string& name) ABSL_EXCLUSIVE_LOCKS_REQUIRED(create_mu_);

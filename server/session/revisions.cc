@@ -42,11 +42,28 @@ absl::Status AddOrigin(SessionStore& store, int64_t first, int64_t last,
   return absl::OkStatus();
 }
 
+/// What a session says that is gone: then what its store says is no damage.
+absl::Status StillThere(Session& session) {
+  return session.Read([](const SessionView&) { return absl::OkStatus(); });
+}
+
+/// Nullopt unless the session is at that revision.
+absl::StatusOr<absl::optional<RecoveredRevision>> CopyIfLast(Session& session, int64_t revision) {
+  const AccessGrant turn = session.access().Acquire(AccessMode::kRead);
+  absl::optional<RecoveredRevision> current;
+  DYNMESH_RETURN_IF_ERROR(session.Read([&](const SessionView& view) {
+    const bool is_last = revision == kLastRevision || revision == view.mesh.revision();
+    if (is_last) current = RecoveredRevision{view.mesh.Clone(), view.commit_time};
+    return absl::OkStatus();
+  }));
+  return current;
+}
+
 }  // namespace
 
 absl::Status AwaitLoaded(Session& session) {
   const AccessGrant turn = session.access().Acquire(AccessMode::kRead);
-  return session.Read([](const SessionView&) { return absl::OkStatus(); });
+  return StillThere(session);
 }
 
 absl::StatusOr<RevisionList> ListRevisions(Session& session, int64_t before, size_t max_count) {
@@ -64,17 +81,14 @@ absl::StatusOr<RevisionList> ListRevisions(Session& session, int64_t before, siz
 }
 
 absl::StatusOr<RecoveredRevision> MeshAt(Session& session, int64_t revision) {
-  absl::optional<RecoveredRevision> current;
-  DYNMESH_RETURN_IF_ERROR(session.Read([&](const SessionView& view) {
-    const bool is_last = revision == kLastRevision || revision == view.mesh.revision();
-    if (is_last) current = RecoveredRevision{view.mesh.Clone(), view.commit_time};
-    return absl::OkStatus();
-  }));
+  DYNMESH_ASSIGN_OR_RETURN(absl::optional<RecoveredRevision> current, CopyIfLast(session, revision));
   if (current.has_value()) return *std::move(current);
   DYNMESH_ASSIGN_OR_RETURN(SessionLog* const log, LogOf(session));
   DYNMESH_ASSIGN_OR_RETURN(const PinnedSource source, log->PinRevision(revision));
   DYNMESH_RETURN_IF_ERROR(session.WaitUntilAcknowledged(revision));  // so that it is written
-  return RecoverRevision(log->store(), *source, session.limits());
+  absl::StatusOr<RecoveredRevision> recovered = RecoverRevision(log->store(), *source, session.limits());
+  if (!recovered.ok()) DYNMESH_RETURN_IF_ERROR(StillThere(session));
+  return recovered;
 }
 
 absl::StatusOr<std::shared_ptr<const HistoryResult>> GoBackTo(Session& session, int64_t revision,
@@ -103,8 +117,6 @@ absl::StatusOr<Snapshot> CreateSnapshot(Session& session, absl::string_view name
   snapshot.revision = revision == 0 ? session.revision() : revision;
   snapshot.create_time = NowToTheMicrosecond();
   snapshot.note = note;
-  // What is not on disk yet could be taken back by a crash, and the snapshot not.
-  DYNMESH_RETURN_IF_ERROR(session.WaitUntilDurable(std::min(snapshot.revision, session.revision())));
   DYNMESH_RETURN_IF_ERROR(log->AddSnapshot(snapshot));
   return snapshot;
 }

@@ -503,7 +503,7 @@ absl::StatusOr<int64_t> Session::Delete(absl::string_view etag) {
 }
 
 absl::Status Session::CheckEtag(absl::string_view etag) const {
-  const std::string present = EtagAt(mesh_.revision());
+  const std::string present = EtagAt(revision());
   return etag.empty() || etag == present ? absl::OkStatus() : EtagMismatch(name(), present);
 }
 

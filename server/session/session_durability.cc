@@ -204,6 +204,7 @@ absl::Status Session::StoreImport(const Mesh& mesh, absl::Time commit_time, cons
   }
   const absl::Status stored = CatchExceptions([&] { return log_->StoreAll(mesh, commit_time, request); });
   if (stored.ok()) return stored;
+  log_->store().DeleteValue(kOriginName).IgnoreError();  // nothing came of it
   WriterMutexLock lock(&mu_);
   stores_import_ = false;
   return stored;

@@ -24,7 +24,7 @@ absl::Time At(int64_t second) { return absl::FromUnixSeconds(second); }
 /// Records of 10 bytes, revision r at second r.
 void AddRecords(RetainedRevisions& retained, int64_t first, int64_t last) {
   for (int64_t revision = first; revision <= last; ++revision)
-    retained.AddRecord({revision, 10, At(revision)});
+    retained.AddRecord({revision, 10, At(revision), /*has_answer=*/true});
 }
 
 /// From revision 0 to 100, with a checkpoint at each multiple of 10, whose pages are one revision later.
@@ -76,6 +76,18 @@ TEST(RetainedRevisionsTest, RecordsStayForAnswers) {
   EXPECT_EQ(retained.TakeSuperfluous({50, 100000}, At(101)).records, 51);
   EXPECT_EQ(retained.TakeSuperfluous({50, 200}, At(101)).records, 81);
   EXPECT_EQ(retained.TakeSuperfluous(kNoAnswers, At(101)).records, 90);
+}
+
+TEST(RetainedRevisionsTest, OnlyRecordsWithAnswersCountAndTheLastOfThemStays) {
+  RetainedRevisions retained({.max_revisions = 1});
+  retained.Reset({{{1, 0, 0}}, {}, 0, {}});
+  retained.AddRecord({1, 100, At(1), true});
+  retained.AddRecord({2, 100, At(2), true});
+  for (int64_t revision = 3; revision <= 50; ++revision) retained.AddRecord({revision, 100, At(revision)});
+  retained.AddCheckpoint({2, 50, 50});
+  EXPECT_EQ(retained.TakeSuperfluous({2, 1000}, At(50)).records, 0) << "edits without ids push nothing out";
+  EXPECT_EQ(retained.TakeSuperfluous({1, 1000}, At(50)).records, 1);
+  EXPECT_EQ(retained.TakeSuperfluous({1, 10}, At(50)).records, 1) << "be it as large as it may";
 }
 
 TEST(RetainedRevisionsTest, ASnapshotKeepsItsCheckpointAndRecords) {

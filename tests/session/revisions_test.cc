@@ -237,19 +237,27 @@ TEST_F(RevisionsTest, RetentionLetsOldRevisionsGoAndTheirPages) {
   }
 }
 
-TEST_F(RevisionsTest, TheRetentionOfASessionIsItsOwn) {
-  Restart(kShortMemory);
+TEST_F(RevisionsTest, ASessionKeepsFewerRevisionsWhenItIsToldSo) {
+  const SessionLogOptions no_answers{.kept_answers = {0, 0}};
+  Restart(no_answers);
   SessionPtr session = daemon_->NewSession("mesh", {.retention = {.max_revisions = 1000}});
   EditAtRandom(*session, 60);
   EXPECT_LE(ListRevisions(*session, 0, 1)->oldest, copies_.begin()->first);
   EXPECT_EQ(session->Info()->settings.retention.max_revisions, 1000u);
   ASSERT_TRUE(session->Update({.retention = Retention{.max_revisions = 3}}, "").ok());
   session = nullptr;
-  Restart(kShortMemory);
+  Restart(no_answers);
   session = Find();
   EXPECT_EQ(session->retention().max_revisions, 3u);
   EditAtRandom(*session, 14);
   EXPECT_GT(ListRevisions(*session, 0, 1)->oldest, session->revision() - 20);
+}
+
+TEST(RetentionTest, OfTwoLimitsTheSmallerOneCounts) {
+  const Retention daemons{100, absl::ZeroDuration(), 1000};
+  EXPECT_EQ((Retention{7, absl::Hours(1), 0}).Within(daemons), (Retention{7, absl::Hours(1), 1000}));
+  EXPECT_EQ((Retention{700, absl::ZeroDuration(), 5}).Within(daemons),
+            (Retention{100, absl::ZeroDuration(), 5}));
 }
 
 TEST_F(RevisionsTest, ASnapshotOutlivesRetentionAndRestarts) {
@@ -280,6 +288,24 @@ TEST_F(RevisionsTest, ASnapshotOutlivesRetentionAndRestarts) {
             (Refusal{absl::StatusCode::kOutOfRange, reason::kRevisionGone}));
   EXPECT_EQ(RefusalOf(FindSnapshotRevision(*session, "before")),
             (Refusal{absl::StatusCode::kNotFound, reason::kSnapshotNotFound}));
+}
+
+TEST_F(RevisionsTest, ASnapshotOfTheEmptySessionOutlivesAnImport) {
+  SessionPtr session = daemon_->NewSession();
+  ASSERT_EQ(CreateSnapshot(*session, "empty", 0, {})->revision, 0);
+  Mesh mesh = ByDimension(TetGrid(2, 2, 2));
+  ASSERT_TRUE(session->Adopt(mesh).ok());
+  EditAtRandom(*session, 8);
+  session = nullptr;
+  for (int restarts = 0; restarts < 2; ++restarts) {
+    session = Find();
+    ASSERT_EQ(ListSnapshots(*session)->size(), 1u);
+    const auto then = MeshAt(*session, 0);
+    ASSERT_TRUE(then.ok()) << then.status();
+    EXPECT_EQ(then->mesh.NumLive(EntityKind::kVertex), 0u);
+    session = nullptr;
+    Restart();
+  }
 }
 
 TEST_F(RevisionsTest, BadSnapshotsAreRefused) {

@@ -8,12 +8,17 @@
 #include "absl/strings/str_cat.h"
 #include "core/archive/rebuilder.h"
 #include "core/mesh/error.h"
+#include "server/session/answer_memory.h"
 #include "server/session/durability/manifest.h"
 #include "server/store/store_errors.h"
 
 namespace dynmesh {
 
 namespace {
+
+/// Of all kinds of requests together: at least as many as a session remembers.
+constexpr size_t kRememberedRequests = 4 * kRememberedAnswers;
+constexpr size_t kRememberedBytes = 4 * kRememberedAnswerBytes;
 
 /// A checkpoint that is being read again.
 struct Restart {
@@ -46,6 +51,17 @@ absl::StatusOr<std::vector<Snapshot>> ReadSnapshots(SessionStore& store) {
   return DecodeSnapshots(*bytes);
 }
 
+/// Forgets the oldest ones when they are more than a session remembers.
+void Remember(LoggedRequest request, RecoveredSession& recovered) {
+  recovered.answer_bytes += request.answer.size();
+  recovered.requests.push_back(std::move(request));
+  while (recovered.requests.size() > kRememberedRequests ||
+         (recovered.answer_bytes > kRememberedBytes && recovered.requests.size() > 1)) {
+    recovered.answer_bytes -= recovered.requests.front().answer.size();
+    recovered.requests.pop_front();
+  }
+}
+
 absl::StatusOr<Checkpoint> FindCheckpoint(SessionStore& store, uint64_t number) {
   DYNMESH_ASSIGN_OR_RETURN(std::vector<Checkpoint> checkpoints, store.ListCheckpoints());
   for (Checkpoint& checkpoint : checkpoints) {
@@ -74,8 +90,9 @@ absl::StatusOr<RecoveredSession> RecoverSession(SessionStore& store, const Limit
   recovered.commit_time = restart.manifest.commit_time;
   const auto add_record = [&](int64_t revision, absl::string_view bytes) -> absl::Status {
     DYNMESH_ASSIGN_OR_RETURN(LogRecord record, DecodeLogRecord(bytes));
-    recovered.stored.records.push_back({revision, bytes.size(), record.commit_time});
-    if (!record.request.request_id.empty()) recovered.requests.push_back(std::move(record.request));
+    const bool has_answer = !record.request.request_id.empty();
+    recovered.stored.records.push_back({revision, bytes.size(), record.commit_time, has_answer});
+    if (has_answer) Remember(std::move(record.request), recovered);
     if (revision <= last.revision) return absl::OkStatus();
     recovered.commit_time = record.commit_time;
     return restart.rebuilder.AddRecord(record.batch);

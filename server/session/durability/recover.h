@@ -1,6 +1,7 @@
 #ifndef DYNMESH_SERVER_SESSION_DURABILITY_RECOVER_H_
 #define DYNMESH_SERVER_SESSION_DURABILITY_RECOVER_H_
 
+#include <deque>
 #include <vector>
 
 #include "absl/status/statusor.h"
@@ -20,9 +21,10 @@ struct RecoveredSession {
   Mesh mesh;  ///< without stored relations
   absl::Time commit_time;
   StoredRevisions stored;
-  absl::optional<Origin> origin;        ///< of a revision that was never made, if that is a later one
-  DirtyPages changed_pages;             ///< since the last checkpoint
-  std::vector<LoggedRequest> requests;  ///< that have an id, of the records that are kept; the oldest first
+  absl::optional<Origin> origin;       ///< of a revision that was never made, if that is a later one
+  DirtyPages changed_pages;            ///< since the last checkpoint
+  std::deque<LoggedRequest> requests;  ///< that have an id, the last ones; the oldest first
+  uint64_t answer_bytes = 0;           ///< of these
 };
 
 /// What it was at one revision.

@@ -23,13 +23,14 @@ void RetainedRevisions::Reset(StoredRevisions stored) {
   snapshots_ = std::move(stored.snapshots);
   records_.assign(stored.records.begin(), stored.records.end());
   trimmed_ = stored.trimmed;
-  record_bytes_ = 0;
-  for (const StoredRecord& record : records_) record_bytes_ += record.bytes;
 }
 
-void RetainedRevisions::AddRecord(const StoredRecord& record) {
-  records_.push_back(record);
-  record_bytes_ += record.bytes;
+void RetainedRevisions::AddRecord(const StoredRecord& record) { records_.push_back(record); }
+
+void RetainedRevisions::BeginAgain(const StoredCheckpoint& checkpoint) {
+  records_.clear();
+  trimmed_ = checkpoint.revision;
+  AddCheckpoint(checkpoint);
 }
 
 RetainedRevisions::Superfluous RetainedRevisions::TakeSuperfluous(const AnswersToKeep& answers,
@@ -121,23 +122,27 @@ uint64_t RetainedRevisions::BytesBetween(int64_t after, int64_t last) const {
 }
 
 int64_t RetainedRevisions::SuperfluousForAnswers(const AnswersToKeep& answers) const {
-  size_t count = records_.size();
-  uint64_t bytes = record_bytes_;
+  size_t count = 0;
+  uint64_t bytes = 0;
+  for (const StoredRecord& record : records_) {
+    if (!record.has_answer) continue;
+    ++count;
+    bytes += record.bytes;
+  }
   int64_t last = trimmed_;
   for (const StoredRecord& record : records_) {
-    if (count <= answers.records && bytes <= answers.bytes) break;
+    if (record.has_answer) {
+      if (count <= 1 || (count <= answers.records && bytes <= answers.bytes)) break;
+      bytes -= record.bytes;
+      --count;
+    }
     last = record.revision;
-    bytes -= record.bytes;
-    --count;
   }
   return last;
 }
 
 void RetainedRevisions::ForgetRecords(int64_t revision) {
-  while (!records_.empty() && records_.front().revision <= revision) {
-    record_bytes_ -= records_.front().bytes;
-    records_.pop_front();
-  }
+  while (!records_.empty() && records_.front().revision <= revision) records_.pop_front();
   trimmed_ = std::max(trimmed_, revision);
 }
 

@@ -21,6 +21,7 @@ struct StoredRecord {
   int64_t revision = 0;
   uint64_t bytes = 0;
   absl::Time commit_time;
+  bool has_answer = false;  ///< to a request that has an id
 };
 
 /// A checkpoint that the store holds. With the records after `revision` it gives any revision from `newest`
@@ -67,6 +68,8 @@ class RetainedRevisions {
   void Reset(StoredRevisions stored);
   void AddRecord(const StoredRecord& record);
   void AddCheckpoint(const StoredCheckpoint& checkpoint) { checkpoints_.push_back(checkpoint); }
+  /// The same of one to which no records lead: those that there were are gone.
+  void BeginAgain(const StoredCheckpoint& checkpoint);
 
   /// What nobody needs any more.
   struct Superfluous {
@@ -74,8 +77,8 @@ class RetainedRevisions {
     int64_t records = 0;            ///< up to this revision; 0: none
     std::vector<RecordRange> kept;  ///< but for these
   };
-  /// So many of the last records stay in any case, and so many bytes of them: for the answers that retries
-  /// get.
+  /// So many of the last records with answers stay in any case, and so many bytes of them, for retries; the
+  /// last one always.
   struct AnswersToKeep {
     size_t records = 0;
     uint64_t bytes = 0;
@@ -116,7 +119,6 @@ class RetainedRevisions {
   std::deque<StoredRecord> records_;  ///< after trimmed_
   std::vector<Snapshot> snapshots_;
   std::vector<RevisionSource> pins_;
-  uint64_t record_bytes_ = 0;
   int64_t trimmed_ = 0;
 };
 

@@ -83,7 +83,7 @@ void SessionLog::Append(int64_t revision, absl::Time commit_time, const LoggedRe
   bytes_since_checkpoint_ += record.bytes.size();
   {
     MutexLock lock(&mu_);
-    retained_.AddRecord({revision, record.bytes.size(), commit_time});
+    retained_.AddRecord({revision, record.bytes.size(), commit_time, !request.request_id.empty()});
   }
   auto done = [revision, acknowledged = acknowledged_, durable = durable_](const absl::Status& status) {
     if (status.ok()) return acknowledged->Reach(revision);
@@ -111,10 +111,11 @@ absl::Status SessionLog::StoreAll(const Mesh& mesh, absl::Time commit_time, cons
     DYNMESH_RETURN_IF_ERROR(Write(std::move(encoded), *writer));
   }
   if (revision > 0) DYNMESH_RETURN_IF_ERROR(store_->PutValue(kOriginName, EncodeOrigin(origin)));
-  DYNMESH_RETURN_IF_ERROR(writer->Commit(EncodeManifest({commit_time, EncodeHead(mesh), revision})));
+  const std::string manifest = EncodeManifest({commit_time, EncodeHead(mesh), revision});
+  DYNMESH_RETURN_IF_ERROR(writer->Commit(manifest, FormerCheckpoint::kKeep));
   {
     MutexLock lock(&mu_);
-    retained_.Reset({{{writer->number(), revision, revision}}, {}, revision, {}});
+    retained_.BeginAgain({writer->number(), revision, revision});
   }
   acknowledged_->Reach(revision);
   durable_->Reach(revision);
@@ -126,10 +127,11 @@ absl::Status SessionLog::WriteCheckpoint(Reader read) {
   DirtyPages pages;
   SessionManifest manifest;
   int64_t revision = 0;
+  uint64_t bytes = 0;
   DYNMESH_RETURN_IF_ERROR(read([&](const Mesh& mesh, absl::Time commit_time) {
     manifest = {commit_time, EncodeHead(mesh), mesh.revision()};
     revision = mesh.revision();
-    bytes_since_checkpoint_ = 0;
+    bytes = bytes_since_checkpoint_.exchange(0);
     MutexLock lock(&mu_);
     std::swap(pages, dirty_);  // cannot fail, and comes last
     return absl::OkStatus();
@@ -145,6 +147,7 @@ absl::Status SessionLog::WriteCheckpoint(Reader read) {
     return absl::OkStatus();
   });
   if (!written.ok()) {
+    bytes_since_checkpoint_ += bytes;
     MutexLock lock(&mu_);
     const absl::Status kept = CatchExceptions([&]() ABSL_NO_THREAD_SAFETY_ANALYSIS {
       dirty_.Add(pages);

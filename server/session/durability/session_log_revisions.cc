@@ -1,6 +1,7 @@
 // What a session log knows of earlier revisions.
 
 #include <algorithm>
+#include <memory>
 #include <utility>
 
 #include "core/mesh/error.h"
@@ -11,7 +12,7 @@ namespace dynmesh {
 
 void SessionLog::SetRetention(const Retention& retention) {
   MutexLock lock(&mu_);
-  retained_.SetRetention(retention.Or(options_.retention));
+  retained_.SetRetention(retention.Within(options_.retention));
 }
 
 int64_t SessionLog::oldest_revision() const {
@@ -20,8 +21,7 @@ int64_t SessionLog::oldest_revision() const {
 }
 
 absl::StatusOr<PinnedSource> SessionLog::PinRevision(int64_t revision) {
-  MutexLock lock(&mu_);
-  DYNMESH_ASSIGN_OR_RETURN(const RevisionSource source, retained_.FindSource(revision));
+  auto source = std::make_unique<RevisionSource>();
   const auto unpin = [this](const RevisionSource* pinned) {
     {
       MutexLock unpin_lock(&mu_);
@@ -29,9 +29,12 @@ absl::StatusOr<PinnedSource> SessionLog::PinRevision(int64_t revision) {
     }
     delete pinned;
   };
-  PinnedSource pin(new RevisionSource(source), unpin);
-  retained_.Pin(source);
-  return pin;
+  {
+    MutexLock lock(&mu_);
+    DYNMESH_ASSIGN_OR_RETURN(*source, retained_.FindSource(revision));
+    retained_.Pin(*source);
+  }
+  return PinnedSource(source.release(), unpin);
 }
 
 std::vector<Snapshot> SessionLog::snapshots() const {
@@ -52,6 +55,8 @@ absl::Status SessionLog::AddSnapshot(Snapshot snapshot) {
   std::vector<Snapshot> all = snapshots();
   if (all.size() >= kMaxSnapshots) return LimitExceeded("max_snapshots", kMaxSnapshots, all.size() + 1);
   DYNMESH_ASSIGN_OR_RETURN(const PinnedSource pin, PinRevision(snapshot.revision));
+  // What is not on disk yet could be taken back by a crash, and the snapshot not.
+  DYNMESH_RETURN_IF_ERROR(durable_->Await(snapshot.revision));
   snapshot.checkpoint = pin->checkpoint;
   snapshot.checkpoint_revision = pin->records.after;
   const auto place =

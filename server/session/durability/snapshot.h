@@ -25,7 +25,7 @@ struct Snapshot {
   friend bool operator==(const Snapshot&, const Snapshot&) = default;
 };
 
-inline constexpr size_t kMaxSnapshots = 1000;  ///< of a session
+inline constexpr size_t kMaxSnapshots = 500;  ///< of a session
 
 /// The value of a session's store that lists its snapshots.
 inline constexpr char kSnapshotsName[] = "snapshots";
