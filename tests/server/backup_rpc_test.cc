@@ -291,6 +291,32 @@ TEST_F(BackupRpcTest, ABackupThatIsNotReadCountsUntilItsCallEnds) {
   EXPECT_TRUE(backup.status.ok());
 }
 
+TEST_F(BackupRpcTest, ABackupThatNobodyReadsMakesRoomAndItsReaderIsTold) {
+  Limits limits;
+  limits.max_backup_bytes = 60'000'000;
+  limits.import_idle_timeout = absl::Milliseconds(300);
+  StartServer(limits);
+  const absl::Time end = absl::Now() + kPatience;
+  ASSERT_TRUE(CreateSession("a").ok());
+  const Mesh mesh = TetGrid(36, 36, 36);
+  while (!Import("a", mesh, nullptr, 50'000).ok()) ASSERT_LT(absl::Now(), end);  // it may be late, too
+  PatientContext context;
+  v1::BackupSessionRequest request;
+  request.set_session("a");
+  const auto stub = backups();
+  const auto unread = stub->BackupSession(&context, request);
+  v1::BackupSessionResponse response;
+  ASSERT_TRUE(unread->Read(&response));
+  ASSERT_GT(2 * response.session().memory_bytes(), limits.max_backup_bytes);
+  BackedUp backup = BackUp("a");
+  while (!backup.status.ok() && absl::Now() < end) backup = BackUp("a");
+  EXPECT_TRUE(backup.status.ok()) << backup.status.error_message();
+  std::string bytes;
+  while (unread->Read(&response)) bytes += response.data();
+  EXPECT_LT(bytes.size(), backup.bytes.size());
+  ExpectError(unread->Finish(), grpc::DEADLINE_EXCEEDED, reason::kImportIdle, "limit", "import_idle_timeout");
+}
+
 TEST_F(BackupRpcTest, TheLimitsAreThoseOfTheServerThatRestores) {
   MakeSession("a", TetGrid(4, 4, 4));
   const std::string bytes = MustBackUp("a");
