@@ -99,7 +99,7 @@ ABSL_FLAG(uint64_t, max_staged_bytes, dynmesh::Limits().max_staged_bytes,
 ABSL_FLAG(uint64_t, max_backup_bytes, dynmesh::Limits().max_backup_bytes,
           "Copies of sessions that backups are written of, all together");
 ABSL_FLAG(absl::Duration, import_idle_timeout, dynmesh::Limits().import_idle_timeout,
-          "How long an import may send nothing, or not read what it is told");
+          "How long an import or restore may send nothing, or an import or backup not read what it is told");
 ABSL_FLAG(uint32_t, max_queued_tasks, dynmesh::Limits().max_queued_tasks,
           "Calls that wait for a thread or for their session, for each of the two pools of threads");
 ABSL_FLAG(uint64_t, max_queued_bytes, dynmesh::Limits().max_queued_bytes, "Requests of the calls that wait");

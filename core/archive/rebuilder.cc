@@ -112,7 +112,8 @@ bool Rebuilder::ReadPageColumns(EntityKind kind, const Range& range, ByteReader&
     if (!ReadColumnSection(in, section) || section.column < next_column) return false;
     next_column = section.column + 1;
     if (section.column >= mesh_.attributes_.size()) continue;
-    if (mesh_.attributes_[section.column].spec().kind != kind || !ReadColumn(section, range, nullptr)) return false;
+    if (mesh_.attributes_[section.column].spec().kind != kind || !ReadColumn(section, range, nullptr))
+      return false;
   }
   return true;
 }
@@ -216,8 +217,10 @@ bool Rebuilder::ReadColumn(const ColumnSection& section, const Range& range, Dir
 
 absl::Status Rebuilder::Charge(uint64_t bytes) {
   memory_bytes_ += bytes;
-  if (memory_bytes_ <= options_.max_memory_bytes) return absl::OkStatus();
-  return LimitExceeded("max_memory_bytes", options_.max_memory_bytes, memory_bytes_);
+  if (memory_bytes_ > options_.max_memory_bytes) {
+    return LimitExceeded("max_memory_bytes", options_.max_memory_bytes, memory_bytes_);
+  }
+  return options_.charge ? options_.charge(bytes) : absl::OkStatus();
 }
 
 absl::Status Rebuilder::EnsureRows(EntityKind kind, Slot end) {

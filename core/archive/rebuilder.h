@@ -2,6 +2,7 @@
 #define DYNMESH_CORE_ARCHIVE_REBUILDER_H_
 
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <string>
 #include <vector>
@@ -23,6 +24,9 @@ namespace dynmesh {
 struct RebuildOptions {
   /// About how many bytes the mesh may take; one that says it is larger is refused before they are taken.
   uint64_t max_memory_bytes = std::numeric_limits<uint64_t>::max();
+  /// Asked before so many bytes more are taken, if there is one: what it refuses is not taken, and all ends
+  /// with its error. The sum of what it was asked is memory_bytes().
+  std::function<absl::Status(uint64_t bytes)> charge = {};
 };
 
 /// Makes a mesh of an archive: of a head, the pages that go with it, and the records of the batches since.
@@ -120,8 +124,8 @@ class Rebuilder {
   ArchiveHead head_;
   RebuildOptions options_;
   Mesh mesh_;
-  BatchImage::Fit fit_;        ///< of the head or the last record
-  int64_t newest_page_ = 0;    ///< revision
+  BatchImage::Fit fit_;      ///< of the head or the last record
+  int64_t newest_page_ = 0;  ///< revision
   DirtyPages changed_pages_;
   uint64_t memory_bytes_ = 0;  ///< charged so far
   std::array<Slot, kNumEntityKinds> charged_slots_ = {};

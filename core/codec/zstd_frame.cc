@@ -53,6 +53,11 @@ std::string CompressFrameInParts(absl::string_view bytes, size_t part_bytes) {
   return frame;
 }
 
+uint64_t FrameContentBytes(absl::string_view frame) {
+  static_assert(ZSTD_CONTENTSIZE_UNKNOWN > uint64_t{1} << 63 && ZSTD_CONTENTSIZE_ERROR > uint64_t{1} << 63);
+  return ZSTD_getFrameContentSize(frame.data(), frame.size());
+}
+
 absl::StatusOr<std::string> DecompressFrame(absl::string_view frame, uint64_t min_bytes, uint64_t max_bytes) {
   const unsigned long long claimed = ZSTD_getFrameContentSize(frame.data(), frame.size());
   if (claimed == ZSTD_CONTENTSIZE_ERROR || claimed == ZSTD_CONTENTSIZE_UNKNOWN || claimed < min_bytes ||

@@ -17,6 +17,9 @@ std::string CompressFrame(absl::string_view bytes);
 /// REQUIRES: bytes.size() is a multiple of part_bytes.
 std::string CompressFrameInParts(absl::string_view bytes, size_t part_bytes);
 
+/// What `frame` claims that its content has; more than 2^63 if it claims nothing.
+uint64_t FrameContentBytes(absl::string_view frame);
+
 /// The content of `frame`, which must be exactly one frame that claims between min_bytes and max_bytes.
 /// Errors: DATA_LOSS CORRUPT_PAYLOAD. Cost: memory of at most max_bytes.
 absl::StatusOr<std::string> DecompressFrame(absl::string_view frame, uint64_t min_bytes, uint64_t max_bytes);

@@ -92,9 +92,9 @@ absl::StatusOr<int> ToPageSize(int requested) {
 
 google::protobuf::Timestamp FromTime(absl::Time time) {
   google::protobuf::Timestamp message;
-  const int64_t nanos = absl::ToUnixNanos(time);
-  message.set_seconds(nanos / 1'000'000'000);
-  message.set_nanos(nanos % 1'000'000'000);
+  const int64_t seconds = absl::ToUnixSeconds(time);  // rounds down, so nanos are not negative
+  message.set_seconds(seconds);
+  message.set_nanos(static_cast<int32_t>((time - absl::FromUnixSeconds(seconds)) / absl::Nanoseconds(1)));
   return message;
 }
 

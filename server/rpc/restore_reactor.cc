@@ -102,7 +102,8 @@ absl::Status RestoreReactor::Begin() {
   if (!request_.has_header()) return BadField("header", "a restore begins with a header");
   DYNMESH_ASSIGN_OR_RETURN(options_, ToRestoreOptions(request_.header()));
   DYNMESH_ASSIGN_OR_RETURN(ticket_, services_.registry.import_gate().Enter());
-  reader_ = std::make_unique<BackupReader>(services_.limits());
+  reader_ =
+      std::make_unique<BackupReader>(services_.limits(), Lease(services_.registry.import_gate().staged()));
   return absl::OkStatus();
 }
 
@@ -111,8 +112,6 @@ absl::Status RestoreReactor::AddBytes() {
     return BadField("data", "after the header a restore is nothing but data");
   }
   DYNMESH_RETURN_IF_ERROR(reader_->Add(request_.data()));
-  const uint64_t bytes = reader_->memory_bytes();
-  if (bytes > lease_.held()) DYNMESH_RETURN_IF_ERROR(lease_.Grow(bytes - lease_.held()));
   if (reader_->identity() == nullptr || std::exchange(is_checked_, true)) return absl::OkStatus();
   return CheckRestore(services_.registry, *reader_->identity(), options_);
 }
@@ -143,7 +142,6 @@ void RestoreReactor::EndWith(const absl::Status& status) {
     ended_ = true;
   }
   reader_ = nullptr;
-  lease_ = Lease();
   ticket_ = nullptr;  // before the peer knows that it may come again
   Finish(LoggedStatus(kRestoreRpc, status));
 }

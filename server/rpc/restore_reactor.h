@@ -13,7 +13,6 @@
 #include "server/rpc/service_context.h"
 #include "server/session/backup/backup_reader.h"
 #include "server/session/backup/backup_session.h"
-#include "server/session/budget.h"
 #include "server/session/importer/importer.h"
 #include "server/session/mutex.h"
 
@@ -31,10 +30,7 @@ class RestoreReactor final : public grpc::ServerReadReactor<v1::RestoreBackupReq
  public:
   RestoreReactor(const ServiceContext& services, grpc::CallbackServerContext* context,
                  v1::RestoreBackupResponse* response)
-      : services_(services),
-        context_(context),
-        response_(response),
-        lease_(services.registry.import_gate().staged()) {}
+      : services_(services), context_(context), response_(response) {}
 
   RestoreReactor* Start();
 
@@ -71,9 +67,8 @@ class RestoreReactor final : public grpc::ServerReadReactor<v1::RestoreBackupReq
   v1::RestoreBackupRequest request_;
   BackupRestoreOptions options_;
   std::unique_ptr<ImportGate::Ticket> ticket_;
-  std::unique_ptr<BackupReader> reader_;  ///< null before the header
+  std::unique_ptr<BackupReader> reader_;  ///< null before the header; holds what it takes of max_staged_bytes
   bool is_checked_ = false;               ///< that the session can be made
-  Lease lease_;                           ///< of the daemon's max_staged_bytes
 
   Mutex mu_;
   bool ended_ ABSL_GUARDED_BY(mu_) = false;

@@ -48,7 +48,7 @@ struct Limits {
   uint64_t max_staged_bytes = DefaultMaxSessionBytes();
   /// Copies of sessions that backups are written of, all together.
   uint64_t max_backup_bytes = DefaultMaxSessionBytes();
-  /// How long an import may send nothing, or leave unread what it is told.
+  /// How long an import may send nothing, or leave unread what it is told; a restore and a backup, too.
   absl::Duration import_idle_timeout = absl::Seconds(60);
   /// Calls that wait for a thread or for their session, and the bytes of their requests; for each of the two
   /// pools of threads.

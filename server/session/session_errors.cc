@@ -100,6 +100,12 @@ absl::Status ImportIdle(absl::Duration timeout) {
       {{"limit", "import_idle_timeout"}});
 }
 
+absl::Status BackupIdle(absl::Duration timeout) {
+  return MakeError(absl::StatusCode::kDeadlineExceeded, reason::kImportIdle,
+                   absl::StrCat("nothing of the backup was read for ", absl::FormatDuration(timeout)),
+                   {{"limit", "import_idle_timeout"}});
+}
+
 absl::Status SessionDamaged(absl::string_view name) {
   return MakeError(absl::StatusCode::kDataLoss, reason::kInternal,
                    absl::StrCat("an edit of session ", name,

@@ -60,6 +60,8 @@ absl::Status SessionRecreated(absl::string_view name, absl::string_view expected
 
 /// DEADLINE_EXCEEDED IMPORT_IDLE, metadata limit: of an import or a restore.
 absl::Status ImportIdle(absl::Duration timeout);
+/// The same of a backup whose peer does not read it.
+absl::Status BackupIdle(absl::Duration timeout);
 
 /// DATA_LOSS INTERNAL: an edit ended half way, so what the session holds is not to be trusted.
 absl::Status SessionDamaged(absl::string_view name);

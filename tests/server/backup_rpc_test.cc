@@ -329,6 +329,71 @@ TEST_F(BackupRpcTest, RestoresCountAsImportsAndThoseThatAreIdleMakeRoom) {
               "max_concurrent_imports");
 }
 
+// ---- Backups that nobody reads ----
+
+/// A backup that is begun and not read, and that its server has let go.
+class IdleBackupTest : public BackupRpcTest {
+ protected:
+  void SetUp() override {
+    BackupRpcTest::SetUp();
+    limits_.max_backup_bytes = 60'000'000;
+    limits_.import_idle_timeout = absl::Milliseconds(300);
+    StartServer(limits_);
+    ASSERT_NO_FATAL_FAILURE(Import());
+    stub_ = backups();
+    v1::BackupSessionRequest request;
+    request.set_session("a");
+    unread_ = stub_->BackupSession(&context_, request);
+    ASSERT_TRUE(unread_->Read(&response_));
+    ASSERT_GT(2 * response_.session().memory_bytes(), limits_.max_backup_bytes);
+    ASSERT_NO_FATAL_FAILURE(AwaitRoom());
+  }
+
+  /// Until one is in time.
+  void Import() {
+    ASSERT_TRUE(CreateSession("a").ok());
+    const Mesh mesh = TetGrid(36, 36, 36);
+    while (!BackupRpcTest::Import("a", mesh, nullptr, 50'000).ok()) ASSERT_LT(absl::Now(), end_);
+  }
+
+  void AwaitRoom() {
+    for (whole_ = BackUp("a"); !whole_.status.ok(); whole_ = BackUp("a")) ASSERT_LT(absl::Now(), end_);
+  }
+
+  /// The bytes that it still has.
+  size_t ReadOn() {
+    size_t bytes = 0;
+    while (unread_->Read(&response_)) bytes += response_.data().size();
+    return bytes;
+  }
+
+  const absl::Time end_ = absl::Now() + kPatience;
+  Limits limits_;
+  BackedUp whole_;  ///< another one
+  PatientContext context_;
+  v1::BackupSessionResponse response_;
+  std::unique_ptr<Stub> stub_;
+  std::unique_ptr<grpc::ClientReader<v1::BackupSessionResponse>> unread_;
+};
+
+TEST_F(IdleBackupTest, ItMakesRoomAndItsReaderIsTold) {
+  EXPECT_LT(ReadOn(), whole_.bytes.size());
+  ExpectError(unread_->Finish(), grpc::DEADLINE_EXCEEDED, reason::kImportIdle, "limit",
+              "import_idle_timeout");
+}
+
+TEST_F(IdleBackupTest, ItsReaderMayCancel) {
+  context_.TryCancel();
+  ReadOn();
+  EXPECT_EQ(unread_->Finish().error_code(), grpc::CANCELLED);
+}
+
+TEST_F(IdleBackupTest, ItDoesNotKeepItsServerFromEnding) {
+  StartServer(limits_);
+  ReadOn();
+  EXPECT_FALSE(unread_->Finish().ok());
+}
+
 // ---- Ends ----
 
 TEST_F(BackupRpcTest, ARestoreThatIsCancelledMakesNothing) {

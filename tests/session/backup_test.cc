@@ -14,6 +14,7 @@
 #include "absl/strings/str_cat.h"
 #include "server/session/backup/backup_session.h"
 #include "tests/core/archive/archive_support.h"
+#include "tests/session/backup_support.h"
 #include "tests/session/session_support.h"
 #include "tests/support/meshes.h"
 #include "tests/support/oracle.h"
@@ -24,22 +25,6 @@ namespace {
 
 using ::testing::IsEmpty;
 
-constexpr absl::Time kCreateTime = absl::FromUnixMicros(1'000'000);
-constexpr absl::Time kCommitTime = absl::FromUnixMicros(2'000'000);
-const Refusal kDamaged{absl::StatusCode::kDataLoss, reason::kBackupDamaged};
-
-BackupIdentity Identity() {
-  return {"m", "0123456789abcdef", kCreateTime, kCommitTime, {.durability = SessionDurability::kSync}};
-}
-
-std::string WriteBackup(const BackupIdentity& identity, const Mesh& mesh) {
-  BackupWriter writer(identity, mesh.Clone());
-  std::string bytes;
-  while (!writer.done()) bytes += writer.Next();
-  EXPECT_EQ(writer.pages_done(), writer.num_pages());
-  return bytes;
-}
-
 /// Reads bytes that come in pieces of some sizes.
 absl::StatusOr<Backup> ReadInPieces(absl::string_view bytes, std::mt19937& rng, size_t max_piece) {
   BackupReader reader((Limits()));
@@ -49,22 +34,6 @@ absl::StatusOr<Backup> ReadInPieces(absl::string_view bytes, std::mt19937& rng, 
     bytes.remove_prefix(size);
   }
   return std::move(reader).Finish();
-}
-
-absl::StatusOr<Backup> ReadBackup(absl::string_view bytes, const Limits& limits = {}) {
-  BackupReader reader(limits);
-  DYNMESH_RETURN_IF_ERROR(reader.Add(bytes));
-  return std::move(reader).Finish();
-}
-
-Mesh OneTriangle() {
-  Mesh mesh;
-  for (const Point& point : {Point{0, 0, 0}, Point{1, 0, 0}, Point{0, 1, 0}}) {
-    EXPECT_TRUE(mesh.AddVertex(point).ok());
-  }
-  Add(mesh, ElementType::kTriangle, {0, 1, 2});
-  Commit(mesh);
-  return mesh;
 }
 
 // ---- The form ----
@@ -172,188 +141,6 @@ TEST(BackupTest, AMeshOfManyPartsComesBackInAnyPieces) {
     ASSERT_TRUE(backup.ok()) << backup.status();
     EXPECT_EQ(backup->mesh.checksum(), mesh.checksum());
   }
-}
-
-// ---- Damage ----
-
-TEST(BackupDamageTest, EveryByteThatIsFlippedIsFound) {
-  const std::string bytes = WriteBackup(Identity(), TetWheel(3));
-  for (size_t i = 0; i < bytes.size(); ++i) {
-    for (int bit = 0; bit < 8; ++bit) {
-      std::string damaged = bytes;
-      damaged[i] = static_cast<char>(damaged[i] ^ (1 << bit));
-      const Refusal refusal = RefusalOf(ReadBackup(damaged));
-      if (i == kBackupMagic.size() && refusal.reason == reason::kBackupFormatNewer) continue;
-      ASSERT_EQ(refusal, kDamaged) << "byte " << i << " bit " << bit;
-    }
-  }
-}
-
-TEST(BackupDamageTest, EveryTruncationIsFound) {
-  const std::string bytes = WriteBackup(Identity(), TetWheel(3));
-  for (size_t size = 0; size < bytes.size(); ++size) {
-    ASSERT_EQ(RefusalOf(ReadBackup(absl::string_view(bytes).substr(0, size))), kDamaged) << size;
-  }
-  EXPECT_EQ(RefusalOf(ReadBackup(bytes + "x")), kDamaged);
-}
-
-TEST(BackupDamageTest, PartsThatAreSwappedDoubledOrMissingAreFoundWhereTheyAre) {
-  BackupWriter writer(Identity(), TetGrid(18, 18, 18));
-  std::vector<std::string> pieces;
-  while (!writer.done()) pieces.push_back(writer.Next());
-  ASSERT_GE(pieces.size(), 5u);
-  const auto read = [](const std::vector<std::string>& parts) {
-    std::string bytes;
-    for (const std::string& part : parts) bytes += part;
-    return ReadBackup(bytes).status();
-  };
-  EXPECT_TRUE(read(pieces).ok());
-  for (size_t i = 1; i + 1 < pieces.size(); ++i) {
-    std::vector<std::string> swapped = pieces, doubled = pieces, missing = pieces;
-    std::swap(swapped[i], swapped[i + 1]);
-    doubled.insert(doubled.begin() + i, pieces[i]);
-    missing.erase(missing.begin() + i);
-    EXPECT_EQ(RefusalOf(read(swapped)), kDamaged) << i;
-    EXPECT_EQ(RefusalOf(read(doubled)), kDamaged) << i;
-    EXPECT_EQ(RefusalOf(read(missing)), kDamaged) << i;
-    EXPECT_EQ(MetadataOf(read(doubled), "part"), absl::StrCat(i + 2)) << i;  // the first piece has two parts
-  }
-}
-
-/// The parts of a backup, taken apart and sealed again: what an enemy would do.
-class Forgery {
- public:
-  explicit Forgery(const BackupIdentity& identity) {
-    Append("DYNB\x01");
-    Add(BackupPart::kIdentity, EncodeBackupIdentity(identity));
-  }
-
-  void Add(BackupPart part, absl::string_view content) { Add(part, 0, content.size(), content); }
-  void Add(BackupPart part, uint8_t packing, uint64_t size, absl::string_view content) {
-    ByteWriter out;
-    out.Fixed(part);
-    out.Fixed(packing);
-    out.Varint(size);
-    out.Bytes(content);
-    Append(out.bytes());
-    ByteWriter seal;
-    seal.Fixed<uint64_t>(hash_.value());
-    Append(seal.bytes());
-    ++parts_;
-  }
-  void AddPages(const Archive& archive, int times) {
-    ByteWriter pages;
-    for (int i = 0; i < times; ++i) {
-      for (const auto& [id, page] : archive.pages) pages.Text(page);
-    }
-    Add(BackupPart::kPages, pages.bytes());
-  }
-  void AddEnd(uint64_t pages) {
-    ByteWriter end;
-    end.Varint(parts_);
-    end.Varint(pages);
-    end.Varint(bytes_.size());
-    Add(BackupPart::kEnd, end.bytes());
-  }
-  const std::string& bytes() const { return bytes_; }
-
- private:
-  void Append(absl::string_view bytes) {
-    hash_.Add(bytes);
-    bytes_.append(bytes.data(), bytes.size());
-  }
-
-  RunningHash hash_;
-  std::string bytes_;
-  uint64_t parts_ = 0;
-};
-
-TEST(BackupDamageTest, ForgeriesAreRefused) {
-  const Archive archive = Archive::Of(TetWheel(3));
-  {
-    Forgery sound(Identity());
-    sound.Add(BackupPart::kHead, archive.head);
-    sound.AddPages(archive, 1);
-    sound.AddEnd(archive.pages.size());
-    EXPECT_TRUE(ReadBackup(sound.bytes()).ok()) << ReadBackup(sound.bytes()).status();
-  }
-  {
-    Forgery twice(Identity());
-    twice.Add(BackupPart::kHead, archive.head);
-    twice.AddPages(archive, 2);
-    EXPECT_EQ(RefusalOf(ReadBackup(twice.bytes())), kDamaged);
-  }
-  {
-    Forgery one_for_all(Identity());
-    Archive first;
-    first.pages[archive.pages.begin()->first] = archive.pages.begin()->second;
-    one_for_all.Add(BackupPart::kHead, archive.head);
-    one_for_all.AddPages(first, static_cast<int>(archive.pages.size()));
-    one_for_all.AddEnd(archive.pages.size());
-    EXPECT_EQ(RefusalOf(ReadBackup(one_for_all.bytes())), kDamaged);
-  }
-  {
-    Forgery no_pages(Identity());
-    no_pages.Add(BackupPart::kHead, archive.head);
-    no_pages.AddEnd(0);
-    EXPECT_EQ(RefusalOf(ReadBackup(no_pages.bytes())), kDamaged);
-  }
-  {
-    Forgery wrong_counts(Identity());
-    wrong_counts.Add(BackupPart::kHead, archive.head);
-    wrong_counts.AddPages(archive, 1);
-    wrong_counts.AddEnd(archive.pages.size() + 1);
-    EXPECT_EQ(RefusalOf(ReadBackup(wrong_counts.bytes())), kDamaged);
-  }
-  {
-    Forgery large(Identity());
-    large.Add(BackupPart::kHead, 0, kMaxBackupPartBytes + 1, "");
-    EXPECT_EQ(RefusalOf(ReadBackup(large.bytes())), kDamaged);
-  }
-  {
-    Forgery no_frame(Identity());
-    no_frame.Add(BackupPart::kHead, 1, archive.head.size(), archive.head);
-    EXPECT_EQ(RefusalOf(ReadBackup(no_frame.bytes())), kDamaged);
-  }
-  BackupIdentity unnamed = Identity();
-  unnamed.name = "../etc";
-  EXPECT_EQ(RefusalOf(ReadBackup(Forgery(unnamed).bytes())), kDamaged);
-}
-
-TEST(BackupDamageTest, ResealedDamageIsRefusedOrHarmless) {
-  const Archive archive = Archive::Of(HybridOfFour());
-  std::mt19937 rng(73);
-  for (int i = 0; i < 3000; ++i) {
-    Archive damaged = archive;
-    auto page = std::next(damaged.pages.begin(), rng() % damaged.pages.size());
-    std::string& bytes = rng() % 3 == 0 ? damaged.head : page->second;
-    bytes[6 + rng() % (bytes.size() - 14)] = static_cast<char>(rng());
-    bytes = Resealed(bytes);
-    Forgery forged(Identity());
-    forged.Add(BackupPart::kHead, damaged.head);
-    forged.AddPages(damaged, 1);
-    forged.AddEnd(damaged.pages.size());
-    Limits limits;
-    limits.max_session_bytes = 1 << 20;
-    const auto backup = ReadBackup(forged.bytes(), limits);
-    if (backup.ok()) continue;
-    EXPECT_THAT((std::vector{absl::StatusCode::kDataLoss, absl::StatusCode::kResourceExhausted}),
-                ::testing::Contains(backup.status().code()))
-        << backup.status();
-  }
-}
-
-TEST(BackupDamageTest, AMeshBeyondTheLimitsIsRefusedWhenItsHeadHasCome) {
-  const Mesh mesh = TetGrid(3, 3, 3);
-  const Archive archive = Archive::Of(mesh);
-  Forgery head(Identity());
-  head.Add(BackupPart::kHead, archive.head);
-  Limits limits;
-  limits.max_cells = 5;
-  BackupReader reader(limits);
-  const absl::Status refused = reader.Add(head.bytes());
-  EXPECT_EQ(RefusalOf(refused), (Refusal{absl::StatusCode::kResourceExhausted, reason::kLimitExceeded}));
-  EXPECT_EQ(MetadataOf(refused, "limit"), "max_cells");
 }
 
 // ---- Sessions ----

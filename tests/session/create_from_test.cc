@@ -107,6 +107,10 @@ TEST_F(CreateFromTest, DifferencesFromEarlierRevisionsAreTheSame) {
   const int64_t before = source_->revision();
   Edit(*source_, 10);
   MakeCopy(SessionDurability::kNone);
+  const Mesh source = Copy(*source_), copy = Copy(*copy_);
+  for (int64_t from = 0; from <= source.revision(); ++from) {
+    EXPECT_TRUE(Diff(copy, from) == Diff(source, from)) << "from revision " << from;
+  }
   RecordingSink sink(daemon_->workers(), RecordingSink::Acknowledge::kAtOnce);
   ASSERT_TRUE(sink.Follow(copy_, {}).ok());
   sink.AwaitRevision(copy_->revision());

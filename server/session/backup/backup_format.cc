@@ -1,8 +1,10 @@
 #include "server/session/backup/backup_format.h"
 
+#include <algorithm>
 #include <new>
 #include <utility>
 
+#include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
 #include "core/mesh/error.h"
 #include "server/session/durability/manifest.h"
@@ -12,7 +14,19 @@
 namespace dynmesh {
 namespace {
 
-constexpr size_t kMaxUidBytes = 64;
+constexpr size_t kUidBytes = 16;
+constexpr int64_t kMaxTimeUs = 253'402'300'799'999'999;  // the end of the year 9999
+
+/// Clients are told both: what is no text or no time of protobuf must not come so far.
+bool IsUid(absl::string_view uid) {
+  return uid.size() == kUidBytes && std::all_of(uid.begin(), uid.end(), absl::ascii_isxdigit);
+}
+
+bool ReadTime(ByteReader& in, absl::Time& time) {
+  const int64_t us = in.Fixed<int64_t>();
+  time = absl::FromUnixMicros(us);
+  return us >= 0 && us <= kMaxTimeUs;
+}
 
 void FreeHashState(XXH3_state_t* state) { XXH3_freeState(state); }
 
@@ -32,10 +46,9 @@ bool DecodeBackupIdentity(absl::string_view bytes, BackupIdentity& identity) {
   ByteReader in(bytes);
   identity.name = in.Text();
   identity.uid = in.Text();
-  identity.create_time = absl::FromUnixMicros(in.Fixed<int64_t>());
-  identity.commit_time = absl::FromUnixMicros(in.Fixed<int64_t>());
-  return ReadSettings(in, identity.settings) && in.done() && CheckSessionName(identity.name).ok() &&
-         identity.uid.size() <= kMaxUidBytes;
+  const bool has_times = ReadTime(in, identity.create_time) && ReadTime(in, identity.commit_time);
+  return has_times && ReadSettings(in, identity.settings) && in.done() &&
+         CheckSessionName(identity.name).ok() && IsUid(identity.uid);
 }
 
 RunningHash::RunningHash() : state_(XXH3_createState(), &FreeHashState) {

@@ -43,7 +43,8 @@ struct BackupIdentity {
 };
 
 std::string EncodeBackupIdentity(const BackupIdentity& identity);
-/// False if the bytes are none: no name of a session, no durability.
+/// False if the bytes are none: no name of a session, no uid, a time before 1970 or after 9999, no
+/// durability.
 bool DecodeBackupIdentity(absl::string_view bytes, BackupIdentity& identity);
 
 /// The XXH3 of all bytes so far.

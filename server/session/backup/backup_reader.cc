@@ -107,9 +107,18 @@ absl::Status BackupReader::CheckSeal(absl::string_view part) {
 }
 
 absl::Status BackupReader::ReadPart(const Part& part) {
-  if (part.packing == BackupPacking::kPlain) return ReadContent(part.letter, part.bytes);
+  return part.packing == BackupPacking::kPlain ? ReadContent(part.letter, part.bytes) : ReadPacked(part);
+}
+
+absl::Status BackupReader::ReadPacked(const Part& part) {
+  const uint64_t size = FrameContentBytes(part.bytes);
+  if (size > kMaxBackupPartBytes) return Damaged("cannot be unpacked");
+  DYNMESH_RETURN_IF_ERROR(lease_.Grow(size));
   const absl::StatusOr<std::string> content = DecompressFrame(part.bytes, 0, kMaxBackupPartBytes);
-  return content.ok() ? ReadContent(part.letter, *content) : Damaged("cannot be unpacked");
+  if (!content.ok()) return Damaged("cannot be unpacked");
+  DYNMESH_RETURN_IF_ERROR(ReadContent(part.letter, *content));
+  lease_.Shrink(size);
+  return absl::OkStatus();
 }
 
 absl::Status BackupReader::ReadContent(BackupPart letter, absl::string_view content) {
@@ -132,8 +141,9 @@ absl::Status BackupReader::ReadHead(absl::string_view content) {
   if (!head.ok()) return FromArchive(head.status());
   DYNMESH_RETURN_IF_ERROR(CheckSlotLimits(*head, limits_));
   for (EntityKind kind : kEntityKinds) num_pages_ += head->num_pages(kind);
-  absl::StatusOr<Rebuilder> rebuilder =
-      Rebuilder::Start(content, {.max_memory_bytes = MaxRebuildBytes(limits_)});
+  const RebuildOptions options = {.max_memory_bytes = MaxRebuildBytes(limits_),
+                                  .charge = [this](uint64_t bytes) { return lease_.Grow(bytes); }};
+  absl::StatusOr<Rebuilder> rebuilder = Rebuilder::Start(content, options);
   if (!rebuilder.ok()) return FromArchive(rebuilder.status());
   rebuilder_.emplace(*std::move(rebuilder));
   return absl::OkStatus();

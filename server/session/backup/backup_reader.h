@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <string>
+#include <utility>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -11,6 +12,7 @@
 #include "core/archive/rebuilder.h"
 #include "core/mesh/mesh.h"
 #include "server/session/backup/backup_format.h"
+#include "server/session/budget.h"
 #include "server/session/limits.h"
 
 namespace dynmesh {
@@ -32,11 +34,16 @@ struct Backup {
 /// so damage is seen where it is; what was forged is seen by Finish() at the latest, as by Rebuilder. After
 /// an error nothing but destroying this is of use. Errors of all: DATA_LOSS BACKUP_DAMAGED;
 /// FAILED_PRECONDITION BACKUP_FORMAT_NEWER, ARCHIVE_FORMAT_NEWER; RESOURCE_EXHAUSTED LIMIT_EXCEEDED
-/// (max_vertices to max_cells, max_session_bytes) before what is too much is taken. Memory: the mesh, and a
-/// part. Thread safety: that of std::vector.
+/// (max_vertices to max_cells, max_session_bytes) before what is too much is taken.
+/// Memory: the mesh, and a part. A lease grows by what the mesh takes, and by a part while it is unpacked,
+/// before that is taken, and is held until this is destroyed. Errors: those of the lease, too.
+/// Thread safety: that of std::vector.
 class BackupReader {
  public:
-  explicit BackupReader(const Limits& limits) : limits_(limits) {}
+  explicit BackupReader(const Limits& limits, Lease lease = Lease())
+      : limits_(limits), lease_(std::move(lease)) {}
+  BackupReader(const BackupReader&) = delete;
+  BackupReader& operator=(const BackupReader&) = delete;
 
   absl::Status Add(absl::string_view bytes);
   /// Null before it has come.
@@ -62,6 +69,7 @@ class BackupReader {
   bool IsExpected(BackupPart letter) const;
   absl::Status CheckSeal(absl::string_view part);
   absl::Status ReadPart(const Part& part);
+  absl::Status ReadPacked(const Part& part);
   absl::Status ReadContent(BackupPart letter, absl::string_view content);
   absl::Status ReadHead(absl::string_view content);
   absl::Status ReadPages(absl::string_view content);
@@ -71,6 +79,7 @@ class BackupReader {
   absl::Status FromArchive(const absl::Status& status) const;
 
   const Limits limits_;
+  Lease lease_;
   std::string waiting_;  ///< bytes of a part that is not whole yet
   BackupPlace place_;    ///< of the next part
   RunningHash hash_;

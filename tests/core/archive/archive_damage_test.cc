@@ -20,7 +20,7 @@
 namespace dynmesh::testing {
 namespace {
 
-constexpr RebuildOptions kBounded = {.max_memory_bytes = 64 << 20};
+const RebuildOptions kBounded = {.max_memory_bytes = 64 << 20};
 
 int NumMutations() {
   const char* mutations = std::getenv("DYNMESH_ARCHIVE_MUTATIONS");

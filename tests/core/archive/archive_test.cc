@@ -388,6 +388,22 @@ TEST(ArchiveTest, AMeshThatWouldTakeTooMuchMemoryIsRefusedBeforeItDoes) {
   EXPECT_EQ(ErrorReason(status), reason::kLimitExceeded);
 }
 
+TEST(ArchiveTest, WhatIsTakenIsAskedForBeforeAndARefusalEndsAll) {
+  const Archive archive = Archive::Of(TetGrid(3, 3, 3));
+  uint64_t asked = 0, left = std::numeric_limits<uint64_t>::max();
+  const auto charge = [&](uint64_t bytes) -> absl::Status {
+    if (bytes > left) return LimitExceeded("left", left, bytes);
+    asked += bytes;
+    left -= bytes;
+    return absl::OkStatus();
+  };
+  const auto rebuilder = Rebuilder::Start(archive.head, {.charge = charge});
+  ASSERT_TRUE(rebuilder.ok());
+  EXPECT_EQ(asked, rebuilder->memory_bytes());
+  left = asked - 1;
+  EXPECT_EQ(ErrorReason(Rebuilder::Start(archive.head, {.charge = charge}).status()), reason::kLimitExceeded);
+}
+
 TEST(ArchiveTest, RowsOfColumnsCountAgainstTheMemoryLimit) {
   Mesh mesh = TetGrid(3, 3, 3);
   const RebuildOptions options = {.max_memory_bytes = 100'000};

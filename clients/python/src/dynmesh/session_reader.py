@@ -216,6 +216,8 @@ class SessionReader(PlaceReader):
         ------
         ResourceExhaustedError
             LIMIT_EXCEEDED ``max_backup_bytes``: other backups have not been read yet.
+        DeadlineExceededError
+            IMPORT_IDLE: the file was not written for so long (a minute by default) that the server let go.
         OSError
             The file cannot be written.
         """
