@@ -136,8 +136,11 @@ bool Committer::WriteIsDue() const {
   return num_expected_ == 0 || Clock::now() >= gather_until_;
 }
 
-// Not while a sync runs that somebody waits for: the next one would take as much longer as they are.
-bool Committer::BackgroundWaits() const { return !background_.empty() && (!awaited_ || stopping_); }
+// Not while a sync runs that somebody waits for: the next one would take as much longer as they are. But when
+// each sync finds the next one wanted there is no time between them, so every other one lets a part pass.
+bool Committer::BackgroundWaits() const {
+  return !background_.empty() && (!awaited_ || num_passed_ > 1 || stopping_);
+}
 
 bool Committer::BackgroundIsDue() const {
   return BackgroundWaits() && (stopping_ || Clock::now() >= background_from_);

@@ -17,6 +17,7 @@
 namespace dynmesh::testing {
 namespace {
 
+using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 using ::testing::Pair;
@@ -55,7 +56,8 @@ class Gate {
   int num_waiting_ = 0;
 };
 
-// Notes what is done to it. Before it answers, it passes a gate; a sync covers what was written before that.
+// Notes what is done to it. Before it answers, it passes a gate; a sync covers what was written before that,
+// and what happens during one can be said.
 class NotingEngine final : public Engine {
  public:
   absl::Status Write(const EngineBatch& batch) override {
@@ -70,6 +72,7 @@ class NotingEngine final : public Engine {
   absl::Status Sync() override {
     EXPECT_EQ(num_syncing_.fetch_add(1), 0) << "one at a time";
     const size_t covered = changes().size();
+    if (during_sync != nullptr) during_sync();
     sync_gate.Pass();
     MutexLock lock(&mu_);
     covered_.push_back(covered);
@@ -112,6 +115,7 @@ class NotingEngine final : public Engine {
   }
 
   std::atomic<bool> is_behind{false};
+  std::function<void()> during_sync;
   Gate write_gate;
   Gate sync_gate;
 
@@ -495,6 +499,33 @@ TEST(CommitterTest, TheBackgroundIsWrittenWhileASyncHangsThatNobodyWaitsFor) {
   committer.EnqueueBackground(WriteOf(Durability::kAsync, heard.Of(1)));
   EXPECT_THAT(heard.AwaitSuccesses(2), ElementsAre(0, 1));
   engine.sync_gate.Open();
+}
+
+// Syncs without a gap between them, because each finds that the next one is wanted already. Of two markers
+// the second is written after the round of the large write was handed over.
+TEST(CommitterTest, TheBackgroundIsWrittenThoughEachSyncFindsTheNextOneWanted) {
+  NotingEngine engine;
+  Acknowledgements heard;
+  constexpr int kSyncs = 8, kBackground = 100;
+  std::atomic<int> num_syncs{0};
+  Committer committer(&engine, {.async_delay = kNever});
+  engine.during_sync = [&] {
+    const int sync = ++num_syncs;
+    if (sync == 1) committer.EnqueueBackground(WriteOf(Durability::kAsync, heard.Of(kBackground)));
+    if (sync == kSyncs) return;
+    committer.Enqueue(WriteOf(Durability::kSync, nullptr, size_t{1} << 20));
+    for (int i = 0; i < 2; ++i) {
+      AwaitedWrite marker({}, Durability::kAsync);
+      committer.Enqueue(std::move(marker.write));
+      EXPECT_TRUE(marker.Wait().ok());
+    }
+    heard.Of(sync)(absl::OkStatus());
+  };
+  committer.Enqueue(WriteOf(Durability::kSync, nullptr));
+  std::vector<int> order = heard.AwaitSuccesses(kSyncs);
+  ASSERT_EQ(order.size(), size_t{kSyncs});
+  order.resize(3);
+  EXPECT_THAT(order, Contains(kBackground)) << "the third sync lets it pass at the latest";
 }
 
 TEST(CommitterTest, OnlyTheBackgroundWaitsWhileTheEngineIsBehind) {
