@@ -53,6 +53,7 @@ Committer::Round Committer::TakeRound() {
   } else if (foreground_.empty() && BackgroundWaits()) {
     waiting_bytes_ -= MoveFirst(background_, options_.background_round_bytes, round.writes);
     num_passed_ = 0;
+    background_from_ = {};  // there may be nobody who wakes then
     room_.NotifyAll();
   }
   return round;
