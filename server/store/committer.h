@@ -77,8 +77,7 @@ class Committer {
   /// Blocks while too much waits. Errors: those of status().
   absl::Status AwaitRoom();
 
-  /// Returns when all that was enqueued before is written, and of the foreground on disk, or has failed. Not
-  /// from a Done.
+  /// Returns when all that was enqueued before is on disk, or has failed. Not from a Done.
   void Drain();
 
   /// OK, or what writes get since one has failed.

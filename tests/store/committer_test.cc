@@ -20,6 +20,7 @@ namespace {
 using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
+using ::testing::IsSupersetOf;
 using ::testing::Pair;
 using ::testing::UnorderedElementsAre;
 
@@ -619,6 +620,19 @@ TEST(CommitterTest, DrainsBothLanes) {
   const size_t num_syncs = engine.covered().size();
   committer.Drain();
   EXPECT_EQ(engine.covered().size(), num_syncs) << "nothing new, nothing to sync";
+}
+
+TEST(CommitterTest, WhatIsDrainedIsOnDisk) {
+  NotingEngine engine;
+  Acknowledgements heard;
+  Committer committer(&engine, {.async_delay = kNever, .background_round_bytes = 1});
+  for (int i = 0; i < 30; i += 3) {
+    for (int j = 0; j < 2; ++j) committer.EnqueueBackground(ToldWrite(Durability::kAsync, heard, i + j));
+    committer.Enqueue(ToldWrite(Durability::kAsync, heard, i + 2));
+    committer.Drain();
+    const std::vector<int> told = heard.AwaitSuccesses(0);
+    EXPECT_THAT(told, IsSupersetOf({i + kOnDisk, i + 1 + kOnDisk, i + 2 + kOnDisk}));
+  }
 }
 
 TEST(CommitterTest, WritesAndSyncsWhatWaitsBeforeItEnds) {
