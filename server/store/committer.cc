@@ -54,13 +54,10 @@ absl::Status Committer::AwaitRoom() {
 }
 
 void Committer::Drain() {
-  AwaitedWrite foreground({}, Durability::kSync);
-  AwaitedWrite background({}, Durability::kAsync);
-  EnqueueBackground(std::move(background.write));
-  Enqueue(std::move(foreground.write));
+  AwaitedWrite last({}, Durability::kSync);  // no background write overtakes one of the foreground
+  EnqueueBackground(std::move(last.write));
   // Who drains wants to know that nothing waits any more; a failure is told by status().
-  (void)background.Wait();
-  (void)foreground.Wait();
+  (void)last.Wait();
 }
 
 absl::Status Committer::status() const {
@@ -136,8 +133,11 @@ bool Committer::WriteIsDue() const {
   return num_expected_ == 0 || Clock::now() >= gather_until_;
 }
 
-// Not while a sync runs that somebody waits for: the next one would take as much longer as they are.
-bool Committer::BackgroundWaits() const { return !background_.empty() && (!awaited_ || stopping_); }
+// Not while a sync runs that somebody waits for: the next one would take as much longer as they are. But when
+// each sync finds the next one wanted there is no time between them, so every other one lets a part pass.
+bool Committer::BackgroundWaits() const {
+  return !background_.empty() && (!awaited_ || num_passed_ > 1 || stopping_);
+}
 
 bool Committer::BackgroundIsDue() const {
   return BackgroundWaits() && (stopping_ || Clock::now() >= background_from_);

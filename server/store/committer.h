@@ -39,8 +39,12 @@ struct CommitterOptions {
 ///
 /// Two threads take two roles in turn. Who has written a round that somebody wants on disk, or finds that the
 /// oldest write has waited for async_delay, syncs it himself, and the other goes on writing; what comes while
-/// a sync runs is covered by the next one. So one editor's sync costs no change of threads, and no write ever
-/// waits for a sync of others.
+/// a sync runs is covered by the next one. So one editor's sync costs no change of threads.
+///
+/// No kAsync write of the foreground waits for a sync. Small kSync writes do: when one runs, they wait for
+/// its end, and then a part of its time for those whom it was for, to share the next one with them. The
+/// background waits while a sync runs that somebody awaits, which would take as much longer, but not for two
+/// in a row.
 ///
 /// Each lane keeps its order; a write overtakes those of the background, and no other. Acknowledgements keep
 /// it among writes of the same durability. After a write or a sync has failed, so do all later writes
@@ -73,8 +77,7 @@ class Committer {
   /// Blocks while too much waits. Errors: those of status().
   absl::Status AwaitRoom();
 
-  /// Returns when all that was enqueued before is written, and of the foreground on disk, or has failed. Not
-  /// from a Done.
+  /// Returns when all that was enqueued before is on disk, or has failed. Not from a Done.
   void Drain();
 
   /// OK, or what writes get since one has failed.
@@ -142,6 +145,7 @@ class Committer {
   bool writing_ ABSL_GUARDED_BY(mu_) = false;  ///< somebody is the writer
   bool syncing_ ABSL_GUARDED_BY(mu_) = false;  ///< somebody is the syncer
   bool awaited_ ABSL_GUARDED_BY(mu_) = false;  ///< and somebody waits for that sync
+  int num_passed_ ABSL_GUARDED_BY(mu_) = 0;    ///< awaited syncs begun since the background last had a turn
   int num_idle_ ABSL_GUARDED_BY(mu_) = 0;      ///< threads that wait for news
   int num_timed_ ABSL_GUARDED_BY(mu_) = 0;     ///< those of them that wake when a sync is due
   bool called_ ABSL_GUARDED_BY(mu_) = false;   ///< an idle thread was told, and has not begun to look

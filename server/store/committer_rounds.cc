@@ -52,6 +52,8 @@ Committer::Round Committer::TakeRound() {
     background_from_ = round.began + kCatchUp;
   } else if (foreground_.empty() && BackgroundWaits()) {
     waiting_bytes_ -= MoveFirst(background_, options_.background_round_bytes, round.writes);
+    num_passed_ = 0;
+    background_from_ = {};  // there may be nobody who wakes then
     room_.NotifyAll();
   }
   return round;
@@ -128,6 +130,7 @@ absl::Status Committer::Sync(std::vector<Round>& rounds) {
     rounds.swap(not_on_disk_);
     sync_at_.reset();
     awaited_ = std::exchange(sync_wanted_, false);
+    if (awaited_ && !background_.empty()) ++num_passed_;
     if (!failure_.ok() || !is_dirty) return failure_;
   }
   const absl::Status status = SyncEngine();

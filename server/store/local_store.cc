@@ -117,7 +117,7 @@ absl::StatusOr<std::unique_ptr<SessionStore>> LocalStore::OpenSession(absl::stri
     ownership = found->second.ownership;
   }
   DYNMESH_ASSIGN_OR_RETURN(const uint64_t token, ownership->TakeOver());
-  committer_.Drain();  // of what the former owner appended
+  committer_.Drain();  // to disk what the former owner wrote
   return LocalSession::Open(OwnedSession(std::move(ownership), token, engine_.get(), &committer_));
 }
 

@@ -17,8 +17,10 @@
 namespace dynmesh::testing {
 namespace {
 
+using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
+using ::testing::IsSupersetOf;
 using ::testing::Pair;
 using ::testing::UnorderedElementsAre;
 
@@ -55,7 +57,8 @@ class Gate {
   int num_waiting_ = 0;
 };
 
-// Notes what is done to it. Before it answers, it passes a gate; a sync covers what was written before that.
+// Notes what is done to it. Before it answers, it passes a gate; a sync covers what was written before that,
+// and what happens during one can be said.
 class NotingEngine final : public Engine {
  public:
   absl::Status Write(const EngineBatch& batch) override {
@@ -70,13 +73,19 @@ class NotingEngine final : public Engine {
   absl::Status Sync() override {
     EXPECT_EQ(num_syncing_.fetch_add(1), 0) << "one at a time";
     const size_t covered = changes().size();
+    if (during_sync != nullptr) during_sync();
     sync_gate.Pass();
     MutexLock lock(&mu_);
     covered_.push_back(covered);
     --num_syncing_;
     return sync_result_;
   }
-  bool IsBehind() const override { return is_behind; }
+  bool IsBehind() const override {
+    MutexLock lock(&mu_);
+    ++num_asked_;
+    changed_.NotifyAll();
+    return is_behind;
+  }
   absl::StatusOr<absl::optional<std::string>> Get(absl::string_view) const override {
     return absl::UnimplementedError("");
   }
@@ -100,6 +109,12 @@ class NotingEngine final : public Engine {
     EXPECT_TRUE(AwaitThat(&mu_, changed_, [&] { return changes_.size() >= count; }));
   }
 
+  /// Until it was asked so often whether it is behind.
+  void AwaitAsked(size_t count) {
+    MutexLock lock(&mu_);
+    EXPECT_TRUE(AwaitThat(&mu_, changed_, [&] { return num_asked_ >= count; }));
+  }
+
   /// How many changes each write had.
   std::vector<size_t> changes() const {
     MutexLock lock(&mu_);
@@ -112,12 +127,14 @@ class NotingEngine final : public Engine {
   }
 
   std::atomic<bool> is_behind{false};
+  std::function<void()> during_sync;
   Gate write_gate;
   Gate sync_gate;
 
  private:
   mutable Mutex mu_;
-  CondVar changed_;
+  mutable CondVar changed_;
+  mutable size_t num_asked_ = 0;
   absl::Status write_result_;
   absl::Status sync_result_;
   std::vector<size_t> changes_;
@@ -497,6 +514,33 @@ TEST(CommitterTest, TheBackgroundIsWrittenWhileASyncHangsThatNobodyWaitsFor) {
   engine.sync_gate.Open();
 }
 
+// Syncs without a gap between them, because each finds that the next one is wanted already. Of two markers
+// the second is written after the round of the large write was handed over.
+TEST(CommitterTest, TheBackgroundIsWrittenThoughEachSyncFindsTheNextOneWanted) {
+  NotingEngine engine;
+  Acknowledgements heard;
+  constexpr int kSyncs = 8, kBackground = 100;
+  std::atomic<int> num_syncs{0};
+  Committer committer(&engine, {.async_delay = kNever});
+  engine.during_sync = [&] {
+    const int sync = ++num_syncs;
+    if (sync == 1) committer.EnqueueBackground(WriteOf(Durability::kAsync, heard.Of(kBackground)));
+    if (sync == kSyncs) return;
+    committer.Enqueue(WriteOf(Durability::kSync, nullptr, size_t{1} << 20));
+    for (int i = 0; i < 2; ++i) {
+      AwaitedWrite marker({}, Durability::kAsync);
+      committer.Enqueue(std::move(marker.write));
+      EXPECT_TRUE(marker.Wait().ok());
+    }
+    heard.Of(sync)(absl::OkStatus());
+  };
+  committer.Enqueue(WriteOf(Durability::kSync, nullptr));
+  std::vector<int> order = heard.AwaitSuccesses(kSyncs);
+  ASSERT_EQ(order.size(), size_t{kSyncs});
+  order.resize(3);
+  EXPECT_THAT(order, Contains(kBackground)) << "the third sync lets it pass at the latest";
+}
+
 TEST(CommitterTest, OnlyTheBackgroundWaitsWhileTheEngineIsBehind) {
   NotingEngine engine;
   Acknowledgements heard;
@@ -510,6 +554,28 @@ TEST(CommitterTest, OnlyTheBackgroundWaitsWhileTheEngineIsBehind) {
   EXPECT_THAT(heard.AwaitSuccesses(3), ElementsAre(1, 2, 3));
   engine.is_behind = false;
   EXPECT_THAT(heard.AwaitSuccesses(4), ElementsAre(1, 2, 3, 0));
+}
+
+// What is taken along with others before its time leaves nobody who would wake at that time: one thread is
+// held in a sync that nobody awaits, the other has no reason to look again.
+TEST(CommitterTest, TheBackgroundIsWrittenThoughTheEngineCaughtUpEarly) {
+  for (int i = 0; i < 50 && !HasFailure(); ++i) {
+    NotingEngine engine;
+    Acknowledgements heard;
+    Committer committer(&engine, {.async_delay = absl::Microseconds(1)});
+    engine.sync_gate.Close();
+    committer.Enqueue(WriteOf(Durability::kAsync, heard.Of(0)));
+    engine.sync_gate.AwaitHeld();
+    engine.is_behind = true;
+    committer.EnqueueBackground(WriteOf(Durability::kAsync, heard.Of(1)));
+    engine.AwaitAsked(1);
+    engine.is_behind = false;
+    committer.Enqueue(WriteOf(Durability::kAsync, heard.Of(2)));
+    EXPECT_THAT(heard.AwaitSuccesses(3), UnorderedElementsAre(0, 1, 2));
+    committer.EnqueueBackground(WriteOf(Durability::kAsync, heard.Of(3)));
+    EXPECT_EQ(heard.AwaitSuccesses(4).size(), 4u);
+    engine.sync_gate.Open();
+  }
 }
 
 TEST(CommitterTest, EndsAlthoughTheEngineIsBehind) {
@@ -554,6 +620,19 @@ TEST(CommitterTest, DrainsBothLanes) {
   const size_t num_syncs = engine.covered().size();
   committer.Drain();
   EXPECT_EQ(engine.covered().size(), num_syncs) << "nothing new, nothing to sync";
+}
+
+TEST(CommitterTest, WhatIsDrainedIsOnDisk) {
+  NotingEngine engine;
+  Acknowledgements heard;
+  Committer committer(&engine, {.async_delay = kNever, .background_round_bytes = 1});
+  for (int i = 0; i < 30; i += 3) {
+    for (int j = 0; j < 2; ++j) committer.EnqueueBackground(ToldWrite(Durability::kAsync, heard, i + j));
+    committer.Enqueue(ToldWrite(Durability::kAsync, heard, i + 2));
+    committer.Drain();
+    const std::vector<int> told = heard.AwaitSuccesses(0);
+    EXPECT_THAT(told, IsSupersetOf({i + kOnDisk, i + 1 + kOnDisk, i + 2 + kOnDisk}));
+  }
 }
 
 TEST(CommitterTest, WritesAndSyncsWhatWaitsBeforeItEnds) {
