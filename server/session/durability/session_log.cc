@@ -100,25 +100,27 @@ void SessionLog::Fail(const absl::Status& status) {
 
 absl::Status SessionLog::StoreAll(const Mesh& mesh, absl::Time commit_time, const LoggedRequest& request) {
   DYNMESH_RETURN_IF_ERROR(status());
-  const int64_t revision = mesh.revision();
-  DYNMESH_ASSIGN_OR_RETURN(const auto writer, store_->BeginCheckpoint(revision));
+  DYNMESH_RETURN_IF_ERROR(CommitAll(mesh, {mesh.revision(), 0, commit_time, request}));
+  DropSuperfluous().IgnoreError();  // what fails there is told when the next checkpoint is made
+  acknowledged_->Reach(mesh.revision());
+  durable_->Reach(mesh.revision());
+  return absl::OkStatus();
+}
+
+absl::Status SessionLog::CommitAll(const Mesh& mesh, Origin origin) {
+  DYNMESH_ASSIGN_OR_RETURN(const auto writer, store_->BeginCheckpoint(origin.revision));
   DirtyPages all;
   all.AddAll(mesh);
-  Origin origin{revision, 0, commit_time, request};
   for (PageId page : all.List()) {
     EncodedPage encoded = Encode(mesh, page);
     origin.bytes += encoded.bytes.size();
     DYNMESH_RETURN_IF_ERROR(Write(std::move(encoded), *writer));
   }
-  if (revision > 0) DYNMESH_RETURN_IF_ERROR(store_->PutValue(kOriginName, EncodeOrigin(origin)));
-  const std::string manifest = EncodeManifest({commit_time, EncodeHead(mesh), revision});
+  if (origin.revision > 0) DYNMESH_RETURN_IF_ERROR(store_->PutValue(kOriginName, EncodeOrigin(origin)));
+  const std::string manifest = EncodeManifest({origin.commit_time, EncodeHead(mesh), origin.revision});
   DYNMESH_RETURN_IF_ERROR(writer->Commit(manifest, FormerCheckpoint::kKeep));
-  {
-    MutexLock lock(&mu_);
-    retained_.BeginAgain({writer->number(), revision, revision});
-  }
-  acknowledged_->Reach(revision);
-  durable_->Reach(revision);
+  MutexLock lock(&mu_);
+  retained_.BeginAgain({writer->number(), origin.revision, origin.revision});
   return absl::OkStatus();
 }
 

@@ -124,6 +124,8 @@ class SessionLog final : public BatchKeeper {
   const SessionLogOptions& options() const { return options_; }
 
  private:
+  /// Without a word to those who wait for it.
+  absl::Status CommitAll(const Mesh& mesh, Origin origin);
   absl::Status DropSuperfluous();
   absl::Status StoreSnapshots(std::vector<Snapshot> snapshots) ABSL_EXCLUSIVE_LOCKS_REQUIRED(snapshots_mu_);
   absl::Status WritePages(Reader read, const DirtyPages& pages, CheckpointWriter& writer, int64_t& newest);
