@@ -525,7 +525,7 @@ TEST(CommitterTest, TheBackgroundIsWrittenThoughEachSyncFindsTheNextOneWanted) {
   engine.during_sync = [&] {
     const int sync = ++num_syncs;
     if (sync == 1) committer.EnqueueBackground(WriteOf(Durability::kAsync, heard.Of(kBackground)));
-    if (sync == kSyncs) return;
+    if (sync >= kSyncs) return;
     committer.Enqueue(WriteOf(Durability::kSync, nullptr, size_t{1} << 20));
     for (int i = 0; i < 2; ++i) {
       AwaitedWrite marker({}, Durability::kAsync);
