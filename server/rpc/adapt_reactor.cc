@@ -72,6 +72,7 @@ absl::Status AdaptReactor::Conclude(AccessGrant grant) {
   grant.Release();
   DYNMESH_RETURN_IF_ERROR(adaptation_->session().WaitUntilAcknowledged(adaptation_->revision()));
   FromAdaptResult(result, adaptation_->revision(), result_.mutable_result());
+  result_.mutable_result()->set_durable_revision(adaptation_->session().durable_revision());
   concluded_ = true;
   return absl::OkStatus();
 }

@@ -256,10 +256,10 @@ class Session : public std::enable_shared_from_this<Session> {
       HistoryMove move, const HistoryOptions& options, const StopSignal& stop = StopSignal::Never())
       ABSL_LOCKS_EXCLUDED(mu_);
 
-  /// Puts the session back to what it was, all or nothing, as one revision, which can be undone: `then` is
-  /// its mesh of an earlier revision (MeshAt()). options.count is not used. Errors: ABORTED
-  /// REVISION_MISMATCH; INVALID_ARGUMENT REQUEST_ID_REUSED; RESOURCE_EXHAUSTED; those of `stop`. Nothing
-  /// changed then. Cost: a scan of stamps, and what differs.
+  /// Puts the session back to what it was, all or nothing, as one revision: `then` is its mesh of an earlier
+  /// one (MeshAt()). It can be undone unless that takes more than max_undo_bytes. options.count is not used.
+  /// Errors: ABORTED REVISION_MISMATCH; INVALID_ARGUMENT REQUEST_ID_REUSED; RESOURCE_EXHAUSTED; those of
+  /// `stop`. Nothing changed then. Cost: that of RestoreRevision.
   absl::StatusOr<std::shared_ptr<const HistoryResult>> RestoreTo(const Mesh& then,
                                                                  const HistoryOptions& options,
                                                                  const StopSignal& stop = StopSignal::Never())

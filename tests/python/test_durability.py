@@ -33,6 +33,17 @@ def test_a_session_is_there_again_with_its_ids(tmp_path):
             assert mirror.checksum == after.checksum
 
 
+def test_what_an_adaptation_made_is_on_disk_when_it_answers(tmp_path):
+    with dynmesh.launch(data_dir=tmp_path) as daemon:
+        session = daemon.client.create_session("part")
+        session.import_mesh(two_tets(), progress=False)
+        result = session.adapt(0.5, progress=False)
+        assert result.revision > 1 and result.durable_revision == result.revision
+    with dynmesh.launch(data_dir=tmp_path) as daemon:
+        revisions = list(daemon.client.session("part").revisions())
+        assert [each.kind for each in revisions] == ["adaptation"] * (result.revision - 1) + ["import"]
+
+
 def test_a_mirror_goes_on_across_a_restart(tmp_path):
     directory = tmp_path / "data"
     socket = f"--unix_socket={tmp_path / 'socket'}"

@@ -84,6 +84,8 @@ class AdaptResult:
     refusals : dict of str to int
         Operations that were tried and not carried out, by reason.
     before, after : MeshShape
+    durable_revision : int
+        As in `EditResult`.
     """
 
     revision: int
@@ -96,6 +98,7 @@ class AdaptResult:
     refusals: dict[str, int]
     before: MeshShape
     after: MeshShape
+    durable_revision: int = 0
 
 
 def adapt_request(
@@ -166,4 +169,5 @@ def _result(message: adapt_pb2.AdaptResult) -> AdaptResult:
         refusals=dict(message.refusals),
         before=_shape(message.before),
         after=_shape(message.after),
+        durable_revision=message.durable_revision,
     )
