@@ -29,7 +29,7 @@ flags=(
 
 cmake --preset release -B $build -DDYNMESH_BENCH=ON -DDYNMESH_TESTS=OFF -DDYNMESH_SERVER=ON -DDYNMESH_PYTHON=ON \
   >/dev/null
-cmake --build $build --target core_bench memory_bench scale_bench store_bench dynmeshd dynmesh_python
+cmake --build $build --target core_bench memory_bench scale_bench store_bench store_latency_bench dynmeshd dynmesh_python
 rm -rf $reports $arrays
 mkdir -p $reports $arrays
 
@@ -73,5 +73,10 @@ for size in ${SCALE:-100000 800000}; do
 done
 
 run store.disk.none store_bench $reports
+largest=$(ls -S "$meshes"/*_tet.vtu 2>/dev/null | head -1 || true)
+if [ -n "$largest" ]; then
+  echo "== durability_bench.py $largest"
+  PYTHONPATH=$build/python /usr/bin/python3 tests/bench/durability_bench.py $build/server/dynmeshd "$largest" $reports
+fi
 
 /usr/bin/python3 tests/bench/table.py $reports $build/core.json "${RESULTS:-tests/bench/RESULTS.md}"

@@ -187,8 +187,8 @@ TEST_F(RevisionsTest, AnImportThatACrashCutShortIsForgotten) {
   EXPECT_EQ(list.revisions[0].call, LoggedCall::kEdit);
   EXPECT_EQ(list.revisions[0].note.author, "ann");
   MakeCheckpoint(*session);
-  for (const RevisionInfo& each : ListRevisions(*session, 0, 10)->revisions)
-    EXPECT_NE(each.note.author, "bob");
+  const RevisionList later = *ListRevisions(*session, 0, 10);
+  for (const RevisionInfo& each : later.revisions) EXPECT_NE(each.note.author, "bob");
 }
 
 TEST_F(RevisionsTest, APageOfRevisionsEndsWhereTheNextBegins) {
