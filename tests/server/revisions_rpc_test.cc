@@ -157,6 +157,20 @@ TEST_F(RevisionsRpcTest, RequestsThatCannotBeMetAreRefusedAndChangeNothing) {
   EXPECT_EQ(GetSession("mesh").revision(), 3);
 }
 
+TEST_F(RevisionsRpcTest, CopiesForGoingBackAndForForksAreLimited) {
+  MakeThree();
+  Limits limits;
+  limits.max_backup_bytes = 1000;
+  StartServer(limits, directory_.path());
+  history_ = v1::HistoryService::NewStub(NewChannel());
+  ExpectError(Restore(BackTo(1)), grpc::StatusCode::RESOURCE_EXHAUSTED, "LIMIT_EXCEEDED", "limit",
+              "max_backup_bytes");
+  v1::ForkSessionResponse response;
+  ExpectError(Fork(ForkOf("mesh", "fork"), &response), grpc::StatusCode::RESOURCE_EXHAUSTED, "LIMIT_EXCEEDED",
+              "limit", "max_backup_bytes");
+  EXPECT_EQ(GetSession("mesh").revision(), 3);
+}
+
 TEST_F(RevisionsRpcTest, ARetryOfGoingBackGetsTheFirstAnswer) {
   MakeThree();
   v1::RestoreSessionRequest request = BackTo(2);
