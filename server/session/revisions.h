@@ -17,8 +17,8 @@
 /// What a session was before: earlier revisions, and snapshots of them. Sessions that are not kept on disk
 /// have no past: FAILED_PRECONDITION NO_HISTORY.
 ///
-/// All of these read the disk, and none waits for edits or keeps them waiting: they are for a thread that has
-/// time. REQUIRES: the session is loaded (AwaitLoaded()).
+/// All of these read the disk: they are for a thread that has time. What they take a turn at the session for
+/// is said below; all else goes on beside edits. REQUIRES: the session is loaded (AwaitLoaded()).
 namespace dynmesh {
 
 /// Returns once the session is loaded, or with what it says against that. Waits for its turn to read it.
@@ -50,11 +50,11 @@ inline constexpr int64_t kLastRevision = -1;
 /// What the session was at `revision` (kLastRevision will do).
 /// Errors: OUT_OF_RANGE REVISION_GONE, REVISION_IN_FUTURE; NO_HISTORY, but for the last one;
 /// RESOURCE_EXHAUSTED; those of the store. Cost: that of loading the session; of the last revision: of a
-/// copy.
+/// copy, made when it is its turn to read.
 absl::StatusOr<RecoveredRevision> MeshAt(Session& session, int64_t revision);
 
-/// Puts the session back to what it was at `revision`: Session::RestoreTo() when it is its turn. Only that
-/// keeps others waiting. Errors: those of both.
+/// Puts the session back to what it was at `revision`: MeshAt(), then Session::RestoreTo() when it is its
+/// turn. Errors: those of both.
 absl::StatusOr<std::shared_ptr<const HistoryResult>> GoBackTo(Session& session, int64_t revision,
                                                               const HistoryOptions& options,
                                                               const StopSignal& stop);

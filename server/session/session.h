@@ -350,10 +350,11 @@ class Session : public std::enable_shared_from_this<Session> {
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
   absl::StatusOr<BatchEnding> EditLocked(absl::FunctionRef<absl::StatusOr<BatchEnding>(Mesh&)> edit)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
-  /// What a request with an id got before; else what answer_now() says, which is remembered.
+  /// What a request with an id got before; else what answer_now() says, under the writer lock, which is
+  /// remembered.
   absl::StatusOr<HistoryAnswerPtr> AnswerOnce(
       const HistoryOptions& options, const LoggedRequest& request,
-      absl::FunctionRef<absl::StatusOr<HistoryAnswerPtr>()> answer_now) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);
+      absl::FunctionRef<absl::StatusOr<HistoryAnswerPtr>()> answer_now) ABSL_LOCKS_EXCLUDED(mu_);
   absl::StatusOr<HistoryAnswerPtr> MoveLocked(HistoryMove move, const HistoryOptions& options,
                                               const LoggedRequest& request, const StopSignal& stop)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mu_);

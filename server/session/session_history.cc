@@ -51,40 +51,20 @@ LoggedRequest Answered(LoggedRequest request, const HistoryResult& result) {
 absl::StatusOr<Session::HistoryAnswerPtr> Session::MoveInHistory(HistoryMove move,
                                                                  const HistoryOptions& options,
                                                                  const StopSignal& stop) {
-  DYNMESH_RETURN_IF_ERROR(CheckRequestId(options.request_id));
-  DYNMESH_RETURN_IF_ERROR(CheckNote(options.note));
-  const int64_t revision_before = revision();
-  absl::StatusOr<HistoryAnswerPtr> answer;
-  {
-    WriterMutexLock lock(&mu_);
-    DYNMESH_RETURN_IF_ERROR(CheckEditable());
-    const LoggedRequest request{
-        CallOf(move), options.request_id, FingerprintOf(move, options), {}, options.note};
-    answer = AnswerOnce(options, request, [&]() ABSL_NO_THREAD_SAFETY_ANALYSIS {
-      return MoveLocked(move, options, request, stop);
-    });
-  }
-  if (revision() != revision_before) WakeFollowers();
-  return answer;
+  const LoggedRequest request{
+      CallOf(move), options.request_id, FingerprintOf(move, options), {}, options.note};
+  return AnswerOnce(options, request, [&]() ABSL_NO_THREAD_SAFETY_ANALYSIS {
+    return MoveLocked(move, options, request, stop);
+  });
 }
 
 absl::StatusOr<Session::HistoryAnswerPtr> Session::RestoreTo(const Mesh& then, const HistoryOptions& options,
                                                              const StopSignal& stop) {
-  DYNMESH_RETURN_IF_ERROR(CheckRequestId(options.request_id));
-  DYNMESH_RETURN_IF_ERROR(CheckNote(options.note));
-  const int64_t revision_before = revision();
-  absl::StatusOr<HistoryAnswerPtr> answer;
-  {
-    WriterMutexLock lock(&mu_);
-    DYNMESH_RETURN_IF_ERROR(CheckEditable());
-    const LoggedRequest request{
-        LoggedCall::kRestore, options.request_id, FingerprintOfRestoration(options), {}, options.note};
-    answer = AnswerOnce(options, request, [&]() ABSL_NO_THREAD_SAFETY_ANALYSIS {
-      return RestoreLocked(then, options, request, stop);
-    });
-  }
-  if (revision() != revision_before) WakeFollowers();
-  return answer;
+  const LoggedRequest request{
+      LoggedCall::kRestore, options.request_id, FingerprintOfRestoration(options), {}, options.note};
+  return AnswerOnce(options, request, [&]() ABSL_NO_THREAD_SAFETY_ANALYSIS {
+    return RestoreLocked(then, options, request, stop);
+  });
 }
 
 absl::StatusOr<Session::HistoryAnswerPtr> Session::FindRestoration(const HistoryOptions& options) const {
@@ -97,12 +77,25 @@ absl::StatusOr<Session::HistoryAnswerPtr> Session::FindRestoration(const History
 absl::StatusOr<Session::HistoryAnswerPtr> Session::AnswerOnce(
     const HistoryOptions& options, const LoggedRequest& request,
     absl::FunctionRef<absl::StatusOr<HistoryAnswerPtr>()> answer_now) {
-  if (options.request_id.empty() || options.validate_only) return answer_now();
-  DYNMESH_ASSIGN_OR_RETURN(HistoryAnswerPtr remembered,
-                           history_answers_.Find(options.request_id, request.fingerprint));
-  if (remembered != nullptr) return remembered;
-  DYNMESH_ASSIGN_OR_RETURN(HistoryAnswerPtr answer, answer_now());
-  history_answers_.Remember(options.request_id, request.fingerprint, answer, sizeof(HistoryResult));
+  DYNMESH_RETURN_IF_ERROR(CheckRequestId(options.request_id));
+  DYNMESH_RETURN_IF_ERROR(CheckNote(options.note));
+  const int64_t revision_before = revision();
+  absl::StatusOr<HistoryAnswerPtr> answer;
+  {
+    WriterMutexLock lock(&mu_);
+    DYNMESH_RETURN_IF_ERROR(CheckEditable());
+    const bool once = !options.request_id.empty() && !options.validate_only;
+    if (once) {
+      DYNMESH_ASSIGN_OR_RETURN(HistoryAnswerPtr remembered,
+                               history_answers_.Find(options.request_id, request.fingerprint));
+      if (remembered != nullptr) return remembered;
+    }
+    DYNMESH_ASSIGN_OR_RETURN(answer, answer_now());
+    if (once) {
+      history_answers_.Remember(options.request_id, request.fingerprint, *answer, sizeof(HistoryResult));
+    }
+  }
+  if (revision() != revision_before) WakeFollowers();
   return answer;
 }
 
